@@ -254,7 +254,8 @@ class Detection:
     log, None where an older version did not look for any; ``contact_friction``: None where nothing is known of it.
     ``calibration``: the version of its sensor's by which the log was corrected, and in ``corrections`` how; None where
     there was none. ``gel``: the mechanics of its sensor's gel as they were described then; None also where an older
-    version did not note them.
+    version did not note them. ``fingerprint``: the same in all logs of one grasp, None where an older version did not
+    take it.
     """
 
     method: str
@@ -273,6 +274,7 @@ class Detection:
     calibration: int | None = None
     corrections: tuple[str, ...] | None = None
     gel: Gel | None = None
+    fingerprint: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,7 +301,8 @@ class SampleSummary:
 class SamplesOfLog:
     """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
 
-    ``findings``: names of what was found against the log; ``sensor``: its name.
+    ``findings``: names of what was found against the log; ``sensor``: its name; ``copies``: ids of later logs of the
+    same grasp, which do not count.
     """
 
     grasp_log_id: str
@@ -307,6 +310,7 @@ class SamplesOfLog:
     moments: bytes | None
     findings: tuple[str, ...] = ()
     sensor: str = ""
+    copies: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -282,6 +282,7 @@ class DetectionRow(Base):
     calibration: Mapped[int | None]
     corrections: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     gel: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    fingerprint: Mapped[str | None] = mapped_column(String(64))
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 

@@ -25,7 +25,9 @@ UNKNOWN_SENSOR = "unknown_sensor"
 """Diagnostic, a sentence: the model was asked for as a sensor shows it of which it has no grasp."""
 ELEMENT_AREAS = "element_areas"
 """Diagnostic, a sentence: elements of the material's grasps differ in their area, and of which one forces are."""
-NOTES = (WEAKENING, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
+SAME_GRASPS = "same_grasps"
+"""Diagnostic, a sentence: which of a material's logs are of a grasp that another log of it has, and do not count."""
+NOTES = (WEAKENING, SAME_GRASPS, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

@@ -1,5 +1,6 @@
 """Queries on what was found in a log: detection and samples, stored together."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -43,24 +44,55 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     """The samples of a material, one entry a grasp, oldest first.
 
     Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
-    still: its newest samples count.
+    still: its newest samples count. Of logs of one grasp the one counts that was sent first.
     """
-    found = session.execute(_samples(material_id).order_by(SampleSummaryRow.created_at, GraspLogRow.id))
-    return list({row.sha256: _samples_of_log(row) for row in found}.values())
+    found = session.execute(_samples(material_id).order_by(SampleSummaryRow.created_at, GraspLogRow.id)).all()
+    copies = _copies(found)
+    copied = {each for others in copies.values() for each in others}
+    counted = {row.sha256: row for row in found if row.sha256 not in copied}
+    newest = {row.sha256: row.id for row in found}
+    return [
+        _samples_of_log(row, tuple(newest[each] for each in copies[row.sha256]) if row.sha256 in copies else ())
+        for row in counted.values()
+    ]
+
+
+def others_of_grasp(session: Session, log_id: str, fingerprint: str) -> list[str]:
+    """Ids of other logs of the same grasp and material, not withdrawn and with samples, in the order they were sent."""
+    own = select(GraspLogRow.material_id, GraspLogRow.sha256).where(GraspLogRow.id == log_id)
+    material_id, sha256 = session.execute(own).one()
+    if material_id is None:
+        return []
+    query = select(GraspLogRow.id).join(SampleSummaryRow).join(DetectionRow)
+    same = (DetectionRow.fingerprint == fingerprint, GraspLogRow.sha256 != sha256)
+    ordered = query.where(*_that_count(material_id), *same).order_by(GraspLogRow.created_at, GraspLogRow.id)
+    return list(session.scalars(ordered))
 
 
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
     """The same of its newest logs, newest first; of a log that went through several detectors, as it was sent last."""
-    newest = _samples(material_id).add_columns(GraspLogRow.created_at, GraspLogRow.grid_rows, GraspLogRow.grid_columns)
+    newest = _samples(material_id).add_columns(GraspLogRow.grid_rows, GraspLogRow.grid_columns)
     newest = newest.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)  # as an index has them
+    rows = session.execute(newest).all()
+    copied = {each for others in _copies(rows).values() for each in others}
     found: dict[str, SampledLog] = {}
-    for row in session.execute(newest):
-        grid = (row.grid_rows, row.grid_columns)
-        found.setdefault(row.sha256, SampledLog(_samples_of_log(row), row.created_at, grid))
+    for row in rows:
+        if row.sha256 not in copied:
+            grid = (row.grid_rows, row.grid_columns)
+            found.setdefault(row.sha256, SampledLog(_samples_of_log(row), row.created_at, grid))
     return list(found.values())
 
 
-def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list[Any] | None, str]]:
+def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+    """Contents of the same grasp as another that was sent earlier, by the content of the first."""
+    contents: dict[str, dict[str, None]] = {}  # by fingerprint, in the order in which they were sent
+    for row in sorted(rows, key=lambda row: (row.created_at, row.id)):
+        if row.fingerprint is not None:
+            contents.setdefault(row.fingerprint, {})[row.sha256] = None
+    return {first: others for first, *others in contents.values() if others}
+
+
+def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
     return (
         select(
             GraspLogRow.sha256,
@@ -68,7 +100,9 @@ def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list
             SampleSummaryRow.samples_blob,
             SampleSummaryRow.moments,
             DetectionRow.findings,
+            DetectionRow.fingerprint,
             SensorRow.name.label("sensor"),
+            GraspLogRow.created_at,
         )
         .join(SampleSummaryRow)
         .join(SensorRow, SensorRow.id == GraspLogRow.sensor_id)
@@ -77,9 +111,9 @@ def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list
     )
 
 
-def _samples_of_log(row: Row[Any]) -> SamplesOfLog:
+def _samples_of_log(row: Row[Any], copies: tuple[str, ...] = ()) -> SamplesOfLog:
     findings = tuple(finding["name"] for finding in row.findings or ())
-    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor)
+    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor, copies)
 
 
 def set_moments(session: Session, log_id: str, moments: bytes) -> None:

@@ -30,6 +30,7 @@ from service.domain.doubtful_logs import with_doubts
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
+from service.domain.same_grasp import fingerprint, same_grasp, with_copies
 from service.domain.sensors import grasping
 from service.domain.stored_results import (
     decode_samples,
@@ -155,9 +156,11 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         log = formats.read(run.blobs.path(stored.sha256))
         if log.sensor != stored.sensor:  # it was named beside the file
             log = replace(log, sensor=stored.sensor)
+        mark = fingerprint(log)
     with run.database.read() as session:
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
         gel = sensors.get(session, stored.sensor).gel
+        others = detections.others_of_grasp(session, log_id, mark)
     log, reconstruction = _with_forces(run, correction.log, gel)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(
@@ -166,12 +169,13 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
-        findings = [*reconstruction_findings(reconstruction), *findings]
+        findings = [*same_grasp(others), *reconstruction_findings(reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
         detection = replace(detection, calibration=correction.version, corrections=correction.changed, gel=gel)
+        detection = replace(detection, fingerprint=mark)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
         materials_of_logs.hold(session, log_id)
@@ -270,7 +274,7 @@ def _fit_by(
         data = [_moments(run, part) for part in parts]
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
-    return with_doubts(model, [part.findings for part in parts])
+    return with_copies(with_doubts(model, [part.findings for part in parts]), parts)
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:

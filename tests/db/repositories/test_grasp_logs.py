@@ -115,6 +115,42 @@ def test_samples_of_a_material_are_one_part_a_grasp(
         assert [found.samples_blob for found in detections.samples_of_material(session, paper)] == ["3" * 64, "2" * 64]
 
 
+def test_of_logs_of_one_grasp_the_first_that_is_not_withdrawn_counts(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    with database.write() as session:
+        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
+    prints = {"a": "1" * 64, "b": "1" * 64, "c": None, "d": "2" * 64, "e": "1" * 64, "f": None}
+    ids = {name: add(database, new_log(steel if name == "e" else paper)) for name in prints}
+    with database.write() as session:
+        for name in reversed(prints):  # the first was found last
+            detections.add(session, ids[name], replace(detection, fingerprint=prints[name]), samples)
+
+    def counted() -> dict[str, tuple[str, ...]]:
+        with database.read() as session:
+            found = detections.samples_of_material(session, paper)
+            newest = [log.samples.grasp_log_id for log in detections.newest_sampled_logs(session, paper, 9)]
+        assert sorted(newest) == sorted(part.grasp_log_id for part in found)
+        return {part.grasp_log_id: part.copies for part in found}
+
+    alone: dict[str, tuple[str, ...]] = {ids[name]: () for name in "cdf"}
+    assert counted() == alone | {ids["a"]: (ids["b"],)}
+    with database.write() as session:
+        assert detections.others_of_grasp(session, ids["b"], "1" * 64) == [ids["a"]]
+        assert detections.others_of_grasp(session, ids["e"], "1" * 64) == []
+        grasp_logs.withdraw(session, ids["a"], "the sensor was wet")
+    assert counted() == alone | {ids["b"]: ()}
+
+
+def test_logs_without_a_material_are_no_copies_of_each_other(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    first, second = (add(database, new_log()) for _ in range(2))
+    with database.write() as session:
+        detections.add(session, first, replace(detection, fingerprint="1" * 64), samples)
+        assert detections.others_of_grasp(session, second, "1" * 64) == []
+
+
 @pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 def test_the_newest_logs_with_samples_are_found_without_sorting_all(
     database: Database, new_log: Callable[..., NewGraspLog]

@@ -5,7 +5,6 @@ from dataclasses import replace
 from threading import Thread
 from typing import Any
 
-import numpy as np
 import pytest
 from sqlalchemy import select, update
 
@@ -36,9 +35,9 @@ from service.domain.principal import Principal
 from service.jobs import pipeline
 from service.settings import Settings
 from slipcore import Finding
+from tests.service.grasps import another_grasp
 from tests.service.remembered import remembering
 
-Repack = Callable[..., bytes]
 ANYWHERE = FrictionQuery(0.0, 0.1, None)
 
 
@@ -111,9 +110,8 @@ def numerics_done_once() -> Iterator[None]:
 
 
 @pytest.fixture
-def shop(database: Database, blobs: BlobStore, members: dict[str, Any], repack: Repack) -> Shop:
-    contents = [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(3)]
-    return Shop(database, blobs, contents)
+def shop(database: Database, blobs: BlobStore, content: bytes) -> Shop:
+    return Shop(database, blobs, [another_grasp(content, number) for number in range(3)])
 
 
 def test_after_an_upload_cheap_models_are_fitted_again_and_costly_ones_are_outdated(shop: Shop) -> None:

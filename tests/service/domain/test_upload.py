@@ -27,6 +27,7 @@ from service.formats import parquet
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode
+from tests.service.grasps import another_grasp
 from tests.service.stored import spool, stored_files, wait_for_empty_spool
 from tests.waiting import wait_until
 
@@ -338,9 +339,9 @@ def test_identical_uploads_at_once_are_one_log_and_one_blob(
 
 
 def test_different_uploads_at_once_all_count(
-    client: httpx.Client, material: str, upload: Upload, wait: Wait, members: dict[str, Any], repack: Repack
+    client: httpx.Client, material: str, upload: Upload, wait: Wait, content: bytes
 ) -> None:
-    contents = [repack(members | {"sensor": np.str_(f"finger {k}")}) for k in range(5)]
+    contents = [another_grasp(content, number) for number in range(5)]
     with ThreadPoolExecutor(5) as threads:
         answers = list(threads.map(lambda content: upload(client, content, material=material), contents))
     jobs = [wait(client, answer.json()["job"]["id"]) for answer in answers]

@@ -37,6 +37,7 @@ from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
 from stiction_client.container import encode
+from tests.service.grasps import another_grasp
 from tests.service.remembered import remembering
 
 RunWith = Callable[[Callable[[Session], object]], Job]
@@ -134,7 +135,7 @@ def test_a_log_goes_through_all_stages(shop: Shop, content: bytes, calls: list[s
 def test_an_ingest_keeps_the_models_current_that_planners_ask_for(shop: Shop, content: bytes) -> None:
     shop.run(shop.ingest(content)[1])
     shop.run(shop.fit("conjugate"))
-    shop.run(shop.ingest(content + b"\0")[1])
+    shop.run(shop.ingest(another_grasp(content))[1])
     told = {stored.model.method: (stored.version, stored.outdated) for stored in shop.material().models}
     assert told == {"hierarchical": (2, False), "ols": (2, False), "conjugate": (1, True)}
     best = recommended(shop.material().models)
@@ -149,7 +150,7 @@ def test_logs_and_streams_that_name_no_sensor_are_of_one(
     """They had been fitted as of two, whose gains are unknown: with intervals twice as wide."""
     monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
     for k, name in enumerate(NAMELESS):
-        shop.run(shop.ingest(content + k * b"\0", name)[1])
+        shop.run(shop.ingest(another_grasp(content, k), name)[1])
     scales = [each.model.scales for each in shop.material().models if each.model.method == "hierarchical"]
     assert [each is not None and each.between_sensors for each in scales] == [None]
 
@@ -160,7 +161,7 @@ def test_what_sensors_differ_by_is_stored_and_told(
 ) -> None:
     monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
     shop.run(shop.ingest(content)[1])
-    shop.run(shop.ingest(content + b"\0", "other")[1])
+    shop.run(shop.ingest(another_grasp(content), "other")[1])
     stored = next(each for each in shop.material().models if each.model.method == "hierarchical")
     assert stored.model.scales is not None
     assert stored.model.scales.between_sensors is not None
@@ -173,13 +174,33 @@ def test_what_sensors_differ_by_is_stored_and_told(
     assert answer.notes == model.notes == (stored.model.diagnostics["sensor_gain"],)
 
 
+def test_a_grasp_that_was_sent_in_several_files_counts_once(shop: Shop, content: bytes, ramp: GraspLog) -> None:
+    """Four files of one grasp had been four grasps, which seemed to agree as no grasps do."""
+    shop.run(shop.ingest(content)[1])
+    alone = hierarchical_model(shop).model
+    later, bare = encode(replace(ramp, time=ramp.time + 1000.0)), encode(replace(ramp, truth=None, sensor="other"))
+    copies = [shop.ingest(each, sensor) for each, sensor in ((content + b"\0", "s"), (later, "s"), (bare, "other"))]
+    assert [shop.run(job).status for _, job in copies] == ["done"] * 3
+    stored = hierarchical_model(shop)
+    assert (stored.model.coefficients, stored.model.n) == (alone.coefficients, alone.n)
+    known = KnownModel(stored, to_friction_model(stored.model), "", 0.0, 0.0)
+    (note,) = look_up(known, FrictionQuery(0.0, 0.05, 0.01)).notes
+    assert note.startswith("3 logs repeat the measurements of another log: counted once (")
+    for log_id, _ in copies:
+        found = shop.log(log_id).detection
+        assert log_id in note
+        assert found is not None
+        assert found.findings is not None
+        assert found.findings[0].name == "same grasp"
+
+
 def test_a_log_that_lowers_what_may_be_counted_on_is_named(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", 0)
     ids = []
-    for suffix in (b"", b"\0", b"\0\0"):
-        log_id, job_id = shop.ingest(content + suffix)
+    for number in range(3):
+        log_id, job_id = shop.ingest(another_grasp(content, number))
         shop.run(job_id)
         ids.append(log_id)
     kept = shop.log(ids[1]).samples
@@ -206,8 +227,8 @@ def test_an_ingest_of_many_logs_looks_at_moments_alone(
         return fit(parts, **options)
 
     monkeypatch.setattr(estimators, "fit", noted)
-    for suffix in (b"", b"\0"):
-        shop.run(shop.ingest(content + suffix)[1])
+    for number in range(2):
+        shop.run(shop.ingest(another_grasp(content, number))[1])
     assert seen == [FrictionSamples] * 2 + [Moments] * 4
 
 
@@ -286,7 +307,7 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
         grasps.append(len(samples))
         if len(grasps) == 1:
             monkeypatch.setattr(estimators, "fit", fit)
-            _, second = shop.ingest(content + b"\0")  # a zip may be followed by bytes, so this is other content
+            _, second = shop.ingest(another_grasp(content))
             assert shop.run(second).model_version == 1
             monkeypatch.setattr(estimators, "fit", slow_fit)
         return fit(samples, **options)
@@ -347,8 +368,8 @@ def test_a_fit_reads_moments_where_its_method_needs_no_more_one_part_a_grasp(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, method: str, kind: type
 ) -> None:
     counts = []
-    for suffix in (b"", b"\0"):
-        log_id, job_id = shop.ingest(content + suffix)
+    for number in range(2):
+        log_id, job_id = shop.ingest(another_grasp(content, number))
         shop.run(job_id)
         samples = shop.log(log_id).samples
         assert samples is not None
@@ -374,8 +395,8 @@ def test_moments_that_an_older_version_did_not_store_are_made_up_for(
     shop: Shop, content: bytes, places: bool | None
 ) -> None:
     """Neither those stored without moments, nor those whose moments do not tell their places."""
-    for suffix in (b"", b"\0"):
-        shop.run(shop.ingest(content + suffix)[1])
+    for number in range(2):
+        shop.run(shop.ingest(another_grasp(content, number))[1])
     with shop.database.write() as session:
         before = detections.samples_of_material(session, shop.material_id)
         older_moments = None if places is None else replace(Moments.from_bytes(before[0].moments), grasps=()).to_bytes()
@@ -398,7 +419,7 @@ def test_a_fit_that_logs_overtake_again_and_again_makes_the_others_wait(
         if len(overtaken) < pipeline.FITS_BESIDE_OTHERS:
             overtaken.append(len(parts))
             monkeypatch.setattr(estimators, "fit", fit)
-            shop.run(shop.ingest(content + b"\0" * len(overtaken))[1])
+            shop.run(shop.ingest(another_grasp(content, len(overtaken)))[1])
             monkeypatch.setattr(estimators, "fit", slow_fit)
         return fit(parts, **options)
 
@@ -474,7 +495,7 @@ def test_models_say_so_that_lack_the_samples_of_a_job_that_made_none(
 ) -> None:
     shop.run(shop.ingest(content)[1])
     assert {stored.outdated for stored in shop.material().models} == {False}
-    log_id, job_id = shop.ingest(content + b"\0")
+    log_id, job_id = shop.ingest(another_grasp(content))
     fit = estimators.fit
 
     def ended_meanwhile(*given: Any, **options: Any) -> estimators.FrictionModel:
@@ -494,7 +515,7 @@ def test_models_lack_samples_that_were_being_stored_when_the_job_was_cancelled(
 ) -> None:
     """Who cancels then waits for the worker's transaction, and must see what that has stored."""
     shop.run(shop.ingest(content)[1])
-    log_id, job_id = shop.ingest(content + b"\0")
+    log_id, job_id = shop.ingest(another_grasp(content))
     cancelling, add = Thread(target=cancel, args=(shop, job_id)), detections.add
 
     def add_meanwhile(*given: Any) -> None:
@@ -527,7 +548,7 @@ def test_a_model_by_a_method_that_cannot_fit_all_samples_is_outdated(
         return fit(parts, method=method, **options)
 
     monkeypatch.setattr(estimators, "fit", fit_by)
-    shop.run(shop.ingest(content + b"\0")[1])
+    shop.run(shop.ingest(another_grasp(content))[1])
     assert {stored.model.method: stored.outdated for stored in shop.material().models} == {
         "hierarchical": False,
         "ols": True,
@@ -557,7 +578,7 @@ def test_other_materials_of_the_sensor_tell_how_much_grasps_may_differ(shop: Sho
     shop.run(shop.ingest(content)[1])
     assert "scale 0.07, the default;" in str(hierarchical_model(shop).model.diagnostics["prior"])
     know_card(shop)
-    shop.run(shop.ingest(content + b"\0")[1])
+    shop.run(shop.ingest(another_grasp(content))[1])
     assert "from 1 other material;" in str(hierarchical_model(shop).model.diagnostics["prior"])
     best = recommended(shop.material().models)
     assert best is not None

@@ -2,8 +2,9 @@ from collections.abc import Callable
 from typing import Any
 
 import httpx
-import numpy as np
 import pytest
+
+from tests.service.grasps import another_grasp
 
 Upload = Callable[..., httpx.Response]
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
@@ -72,10 +73,9 @@ def test_what_cannot_be_is_refused(
 
 
 def test_a_log_is_withdrawn_and_the_model_follows(
-    client: httpx.Client, material: str, members: dict[str, Any], repack: Callable[..., bytes], upload: Upload,
-    wait: Wait,
-) -> None:  # fmt: skip
-    logs = [upload(client, repack(members | {"sensor": np.str_(name)}), material=material).json() for name in "ab"]
+    client: httpx.Client, material: str, content: bytes, upload: Upload, wait: Wait
+) -> None:
+    logs = [upload(client, another_grasp(content, number), material=material).json() for number in (0, 1)]
     for log in logs:
         wait(client, log["job"]["id"])
     path = f"/v1/grasp-logs/{logs[0]['id']}"
@@ -95,10 +95,9 @@ def test_a_log_is_withdrawn_and_the_model_follows(
 
 
 def test_an_epoch_begins_and_the_model_follows(
-    client: httpx.Client, material: str, members: dict[str, Any], repack: Callable[..., bytes], upload: Upload,
-    wait: Wait,
-) -> None:  # fmt: skip
-    logs = [upload(client, repack(members | {"sensor": np.str_(name)}), material=material).json() for name in "ab"]
+    client: httpx.Client, material: str, content: bytes, upload: Upload, wait: Wait
+) -> None:
+    logs = [upload(client, another_grasp(content, number), material=material).json() for number in (0, 1)]
     for log in logs:
         wait(client, log["job"]["id"])
     body = {"reason": "coated", "first_grasp_log": logs[1]["id"]}
