@@ -7,7 +7,7 @@ import fcntl
 import logging
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,9 +17,9 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db import identity, migrate
-from db.blobs import BlobStore
+from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
-from db.errors import BlobDamaged, NotEmpty, NotFound
+from db.errors import BlobDamaged, DatabaseError, NotEmpty, NotFound
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
@@ -29,6 +29,8 @@ from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, Sto
 logger = logging.getLogger(__name__)
 
 FILE = "stiction.sqlite3"
+LACKING = "lacking.txt"
+"""In a backup's folder where it lacks blobs that were missing or damaged: their hashes, a line each."""
 LEFT_OUT = {table.__tablename__ for table in (RunnerRow, BrowserSessionRow, IdempotencyKeyRow, StoreRow)}
 """Tables of what is not copied: running processes, sessions, answers to repeated requests, and the store id: what is
 restored is a store of its own, so that two that grow apart are never taken for one."""
@@ -42,12 +44,12 @@ Report = Callable[[str, int], None]
 """What is given the kind of what was copied, and how many of it."""
 
 
-def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -> None:
+def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -> list[str]:
     """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
 
-    May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if the
-    folder has another backup, is getting one, or is the store's own, ``NotFound`` for a file that is missing, and
-    ``StorageUnavailable`` on a full disk.
+    Blobs that are missing or damaged are left out, and listed in the folder for ``restore``; returns what is wrong with
+    each. May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if
+    the folder has another backup, is getting one, or is the store's own, and ``StorageUnavailable`` on a full disk.
     """
     migrate.check(database)
     if blobs.has_within(folder):
@@ -58,18 +60,33 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     with _alone_in(folder):
         if file.exists():
             raise NotEmpty(f"backup {file}", "a folder without one; blobs of an earlier backup may be in it")
-        for attempt in range(1, ATTEMPTS + 1):
-            try:
-                _copy_out(database, blobs, unfinished, report)
+        for _ in range(ATTEMPTS):
+            left_out = _copy_out(database, blobs, unfinished, report)
+            if not any(isinstance(error, NotFound) for error in left_out.values()):
                 break
-            except NotFound:
-                if attempt == ATTEMPTS:
-                    raise
+        _list_lacking(folder, left_out)
         unfinished.replace(file)
         sync_folder(folder)
+    return [str(error) for error in left_out.values()]
 
 
-def _copy_out(database: Database, blobs: BlobStore, unfinished: Path, report: Report) -> None:
+def _list_lacking(folder: Path, hashes: Iterable[str]) -> None:
+    """Durably, and only where there are any: an earlier backup in the folder may have lacked others."""
+    file = folder / LACKING
+    file.unlink(missing_ok=True)
+    if lines := "".join(f"{sha256}\n" for sha256 in hashes):
+        with disk_errors_named(), file.open("w", encoding="ascii") as stream:
+            stream.write(lines)
+            stream.flush()
+            os.fsync(stream.fileno())
+
+
+def _lacking(folder: Path) -> set[str]:
+    file = folder / LACKING
+    return set(file.read_text("ascii").split()) if file.is_file() else set()
+
+
+def _copy_out(database: Database, blobs: BlobStore, unfinished: Path, report: Report) -> dict[str, DatabaseError]:
     for left in (unfinished, *(Path(f"{unfinished}{suffix}") for suffix in SIDE_FILES)):
         left.unlink(missing_ok=True)
     with closing(_opened(unfinished)) as copy:
@@ -77,8 +94,9 @@ def _copy_out(database: Database, blobs: BlobStore, unfinished: Path, report: Re
         _copy_rows(database, copy, report)
         target = BlobStore(unfinished.parent)
         target.clear_spool()  # of a backup that was killed
-        _copy_blobs(copy, blobs, target, report)
+        left_out = _copy_blobs(copy, blobs, target, report)
         copy.empty_log()
+    return left_out
 
 
 @contextmanager
@@ -99,15 +117,16 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 def restore(
     folder: Path, database: Database, blobs: BlobStore, report: Report, *, taken_over_by: Actor | None = None
-) -> None:
+) -> list[str]:
     """Fill an empty database and blob store from a backup; they become a store of their own, with an id of its own.
 
-    Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
-    ``taken_over_by`` somebody, as the audit trail then records; that database is refused there from then on. Raises
-    ``NotEmpty`` for a database that has any rows and for a store that has the backup's blobs or is inside the backup,
-    ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is changed.
-    ``BlobDamaged``, for a blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else fills
-    meanwhile, leave tables without these rows and the blobs before it, and the same restore can be begun again.
+    Every blob must have the bytes that it is named for. Those that the backup itself left out, and nobody has put into
+    it since, are missing afterwards; returns what is said of each. A blob store of another database is only filled
+    where it is ``taken_over_by`` somebody, as the audit trail then records; that database is refused there from then
+    on. Raises ``NotEmpty`` for a database that has any rows and for a store that has the backup's blobs or is inside
+    the backup, ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is
+    changed. ``BlobDamaged``, for a blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else
+    fills meanwhile, leave tables without these rows and the blobs before it, and the same restore can be begun again.
     """
     file = folder / FILE
     if not file.is_file():
@@ -117,7 +136,7 @@ def restore(
     source = BlobStore(folder)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
-        _require_blobs(copy, source, blobs)
+        _require_blobs(copy, source, blobs, _lacking(folder))
         _refuse_rows(database)
         if taken_over_by is None:
             identity.check_to_fill(database, blobs)
@@ -126,8 +145,9 @@ def restore(
             identity.join(database, blobs, alone=True, to_fill=True)
         else:
             identity.adopt(database, blobs, None)
-        _copy_blobs(copy, source, blobs, report)
+        left_out = _copy_blobs(copy, source, blobs, report, _lacking(folder))
         _copy_rows(copy, database, report, taken_over_by)
+    return [str(error) for error in left_out.values()]
 
 
 def damaged(database: Database, blobs: BlobStore, *, deep: bool) -> Iterator[str]:
@@ -223,22 +243,35 @@ def _is_postgresql(session: Session) -> bool:
     return session.connection().dialect.name == "postgresql"
 
 
-def _require_blobs(rows: Database, source: BlobStore, target: BlobStore) -> None:
-    """That all that the rows refer to is in one of the two."""
-    present = {*source.hashes(), *target.hashes()}
+def _require_blobs(rows: Database, source: BlobStore, target: BlobStore, lacking: set[str]) -> None:
+    """That all that the rows refer to is in one of the two, but for what the source is known to lack."""
+    present = {*source.hashes(), *target.hashes(), *lacking}
     with rows.read() as session:
         for sha256 in identity.wanted(session):
             if sha256 not in present:
                 source.locate(sha256)
 
 
-def _copy_blobs(rows: Database, source: BlobStore, target: BlobStore, report: Report) -> None:
-    """Those that the rows refer to and the target has not; rows never refer to a blob that is not stored."""
-    present, count = set(target.hashes()), 0
+def _copy_blobs(
+    rows: Database, source: BlobStore, target: BlobStore, report: Report, may_lack: Container[str] | None = None
+) -> dict[str, DatabaseError]:
+    """Those that the rows refer to and the target has not; rows never refer to a blob that is not stored.
+
+    Returns what is wrong with those that are missing or damaged; raises it of others than ``may_lack`` (None: all may).
+    """
+    present, count, left_out = set(target.hashes()), 0, dict[str, DatabaseError]()
     with rows.read() as session:
         for sha256 in identity.wanted(session):
-            if sha256 not in present:
+            if sha256 in present:
+                continue
+            try:
                 target.take(source.locate(sha256), sha256)
+            except (NotFound, BlobDamaged) as error:
+                if may_lack is not None and sha256 not in may_lack:
+                    raise
+                left_out[sha256] = error
+            else:
                 count += 1
                 report("blobs", count)
     report("blobs", count)
+    return left_out

@@ -27,6 +27,20 @@ REFERS_TO_NONE = (
 )
 
 
+def _named(folder: str) -> Path:
+    """A folder by its name: an empty one, as of a variable that is not set, would be the one where one is."""
+    if not folder:
+        raise typer.BadParameter("the name of the folder is empty; allowed: the name of a folder")
+    return Path(folder)
+
+
+def _tell_without(left_out: list[str]) -> str:
+    """Name the files that a copy lacks, and say how many they are."""
+    for line in left_out:
+        typer.echo(line, err=True)
+    return f", without {len(left_out)} file(s) that are missing or damaged" if left_out else ""
+
+
 @app.command()
 def upgrade(database_url: Url = None) -> None:
     """Bring the database to this version's schema; a new one gets all its tables."""
@@ -89,10 +103,16 @@ def check(
 
 @app.command()
 def backup(
-    folder: Annotated[Path, typer.Argument(help="Where to; blobs of an earlier backup that are in it are not copied.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(parser=_named, help="Where to; blobs of an earlier backup that are in it are not copied."),
+    ],
     database_url: Url = None,
 ) -> None:
-    """Copy everything, rows and blobs, into a folder, as of one moment; the service may run meanwhile."""
+    """Copy everything, rows and blobs, into a folder, as of one moment; the service may run meanwhile.
+
+    Blobs that are missing or damaged are left out and named, with exit code 3.
+    """
     from db import identity, migrate
     from db.backup import backup as copy_out
 
@@ -100,13 +120,15 @@ def backup(
         migrate.check(database)
         blobs = opened_blobs()
         identity.verify(database, blobs)
-        copy_out(database, blobs, folder, _tell)
-    typer.echo(f"backed up to {folder}")
+        left_out = copy_out(database, blobs, folder, _tell)
+    typer.echo(f"backed up to {folder}{_tell_without(left_out)}")
+    if left_out:
+        raise typer.Exit(INPUT_REFUSED)
 
 
 @app.command()
 def restore(
-    folder: Annotated[Path, typer.Argument(help="A folder that `stiction db backup` made.")],
+    folder: Annotated[Path, typer.Argument(parser=_named, help="A folder that `stiction db backup` made.")],
     database_url: Url = None,
     take_over: Annotated[
         bool, typer.Option("--take-over", help="Into files of another database, which is refused there from then on.")
@@ -120,8 +142,9 @@ def restore(
 
     parts = removed_unless_filled(Settings().data_folder, FOLDERS)
     with parts, opened(database_url, may_be_new=True) as database:
-        copy_in(folder, database, opened_blobs(), _tell, taken_over_by=command_actor() if take_over else None)
-    typer.echo(f"restored from {folder}")
+        taken_over_by = command_actor() if take_over else None
+        left_out = copy_in(folder, database, opened_blobs(), _tell, taken_over_by=taken_over_by)
+    typer.echo(f"restored from {folder}{_tell_without(left_out)}")
 
 
 @app.command()

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import inspect, select, update
 
 from db import migrate
-from db.backup import FILE, LEFT_OUT, backup, restore
+from db.backup import FILE, LACKING, LEFT_OUT, backup, restore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUnavailable, StoreMismatch
@@ -203,13 +203,33 @@ def test_a_backup_goes_on_where_an_old_upload_is_deleted_meanwhile(
         assert set(session.scalars(select(GraspLogRow.file_state))) == {"gone"}
 
 
-def test_a_file_that_is_missing_for_good_stops_a_backup_by_name(
-    filled: Database, blobs: BlobStore, tmp_path: Path
+def test_files_that_are_missing_or_damaged_are_named_and_all_else_is_backed_up(
+    filled: Database, other: Database, blobs: BlobStore, tmp_path: Path
 ) -> None:
+    """One of them had made every backup impossible, for ever where it cannot be sent again."""
+    folder, again = tmp_path / "backup", BlobStore(tmp_path / "again")
     blobs.remove([blob_of(b"one")])
-    with pytest.raises(NotFound, match=blob_of(b"one")):
-        backup(filled, blobs, tmp_path / "backup", nothing)
-    assert not (tmp_path / "backup" / FILE).exists()
+    blobs.path(blob_of(b"two")).write_bytes(b"2wo")
+    told = backup(filled, blobs, folder, nothing)
+    assert sorted(line.split(blob_of(b"one"))[0].split(blob_of(b"two"))[0] for line in told) == ["blob ", "no blob '"]
+    assert set((folder / LACKING).read_text().split()) == {blob_of(b"one"), blob_of(b"two")}
+    lacking = restore(folder, other, again, nothing)
+    assert sorted(lacking) == sorted(f"no blob {blob_of(each)!r} is stored" for each in (b"one", b"two"))
+    assert len(rows(other)["grasp_logs"]) == 2
+    assert set(again.hashes()) == {blob_of(b"history"), blob_of(b"samples")}
+
+
+def test_a_backup_that_lacks_files_is_whole_once_they_are_back(
+    filled: Database, other: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    folder = tmp_path / "backup"
+    blobs.remove([blob_of(b"one")])
+    assert len(backup(filled, blobs, folder, nothing)) == 1
+    BlobStore(folder).put(b"one")  # from an older backup
+    assert restore(folder, other, BlobStore(tmp_path / "again"), nothing) == []
+    (folder / FILE).unlink()
+    assert backup(filled, blobs, folder, nothing) == []
+    assert not (folder / LACKING).exists()
 
 
 def test_two_backups_in_one_folder_do_not_meet(filled: Database, blobs: BlobStore, tmp_path: Path) -> None:

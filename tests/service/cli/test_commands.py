@@ -20,7 +20,7 @@ from benchmarks.calibration.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
-from db.repositories import grasp_logs
+from db.repositories import grasp_logs, jobs
 from service import exports, formats
 from service.cli import app, main, progress, streaming
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, NOT_FEASIBLE, SERVICE_REFUSED
@@ -568,6 +568,38 @@ def test_a_command_in_the_wrong_folder_leaves_nothing_there(
     assert code == INPUT_REFUSED
     assert f"no database '{tmp_path / 'wrong' / 'stiction.sqlite3'}' is stored" in err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["backup", "restore"])
+def test_an_empty_name_is_no_folder_of_a_backup(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """It had been the folder where one is, as in a script whose variable is not set."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "data"))
+    assert run("db", "upgrade")[0] == 0
+    code, _, err = run("db", command, "")
+    assert code == 2
+    assert "the name of the folder is empty" in " ".join(err.replace("│", " ").split())
+    assert [path.name for path in tmp_path.iterdir()] == ["data"]
+
+
+def test_a_backup_names_what_it_lacks_and_so_does_what_is_restored(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "data"))
+    assert run("db", "upgrade")[0] == 0
+    lost = BlobStore(tmp_path / "data").put(b"lost")
+    with closing(Database(Settings().resolved_database_url)) as database, database.write() as session:
+        log_id = grasp_logs.add(session, NewGraspLog(lost, 4, "npz", "filter", None, "s", 9, 1.0, (3, 3)))
+        jobs.add(session, "ingest", "auto", material_id=None, grasp_log_id=log_id)
+    BlobStore(tmp_path / "data").remove([lost])
+    code, out, err = run("db", "backup", str(tmp_path / "copy"))
+    assert (code, lost in err, "without 1 file(s)" in out) == (INPUT_REFUSED, True, True)
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "again"))
+    code, out, err = run("db", "restore", str(tmp_path / "copy"))
+    assert (code, lost in err, "without 1 file(s)" in out) == (0, True, True)
+    assert run("db", "check")[0] == INPUT_REFUSED
 
 
 def test_check_tells_files_that_are_missing_or_changed(
