@@ -33,7 +33,8 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format: its content type, where its reader is, how its files begin, and which settings it takes.
+    """A format: its content type, where its reader is, how its files begin, which settings it takes, and which of the
+    mapping's ``entries`` that not every format has a use for.
 
     ``plain``: read by our own bounded code; the others go through libraries, and so through a process of their own.
     ``leads``: nothing may stand before the magic bytes.
@@ -43,6 +44,7 @@ class Format:
     reader: str
     magic: bytes = b""
     settings: tuple[str, ...] = ("mapping", "rest")
+    entries: tuple[str, ...] = ()
     plain: bool = False
     leads: bool = True
 
@@ -51,12 +53,12 @@ FORMATS = {
     "npz": Format("application/vnd.stiction.grasp-log+npz", "npz.read", settings=(), plain=True),
     "tac3d": Format("application/vnd.tac3d+zip", "tac3d.read", settings=(), plain=True),
     "tracked markers": Format("text/csv", "tracked_markers.read", settings=("scale", "frame_rate", "rest")),
-    "frame table": Format("application/vnd.stiction.frame-table+csv", "frame_table.read"),
-    "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n"),
-    "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V"),
-    "rosbag2": Format("application/x-rosbag2", "rosbag.read_bag2", b"SQLite format 3\x00"),
+    "frame table": Format("application/vnd.stiction.frame-table+csv", "frame_table.read", entries=("notes", "element")),
+    "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n", entries=("topic",)),
+    "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V", entries=("topic",)),
+    "rosbag2": Format("application/x-rosbag2", "rosbag.read_bag2", b"SQLite format 3\x00", entries=("topic",)),
     "hdf5": Format("application/x-hdf5", "hdf5.read", b"\x89HDF\r\n\x1a\n", leads=False),
-    "parquet": Format("application/vnd.apache.parquet", "parquet.read", b"PAR1"),
+    "parquet": Format("application/vnd.apache.parquet", "parquet.read", b"PAR1", entries=("episode",)),
     "json": Format("application/json", "json_log.read"),
 }
 
@@ -70,6 +72,13 @@ _WHERE = {
     "frame_rate": "only beside a table of tracked markers: other formats have times",
     "rest": "only beside tracked markers or a format of topics, fields or columns",
     "mapping": "only beside a format of topics, fields or columns",
+}
+
+_WHERE_IN_MAPPING = {
+    "notes": "only for a table",
+    "element": "only for a table",
+    "episode": "only for Parquet (LeRobot)",
+    "topic": "only for MCAP and bags",
 }
 
 PAGE = "docs/formats.md"
@@ -151,10 +160,14 @@ def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:
 
 
 def check_settings(name: str, settings: Settings) -> None:
-    """Raises ``UnusedSetting`` for one that the format does not take."""
+    """Raises ``UnusedSetting`` for one, or for an entry of the mapping, that the format does not take."""
     for key, value in settings.items():
         if value is not None and key not in FORMATS[name].settings:
             raise UnusedSetting(key, f"{str(value)[:60]} with {name}", _WHERE[key])
+    mapping = parse_mapping(settings)
+    for key, entry in () if mapping is None or mapping.preset else mapping.particular_entries.items():
+        if key not in FORMATS[name].entries:
+            raise UnusedSetting(f"mapping {key}", f"{str(entry)[:60]} with {name}", _WHERE_IN_MAPPING[key])
 
 
 def parse_mapping(settings: Settings) -> mappings.FieldMapping | None:

@@ -90,6 +90,13 @@ class FieldMapping:
     preset: bool = False
 
     @property
+    def particular_entries(self) -> dict[str, object]:
+        """What of it not every format has a use for, by name, where it is given."""
+        topic = next((origin.topic for origin in self.origins.values() if origin.topic is not None), None)
+        entries = {"notes": self.notes or None, "element": self.element, "episode": self.episode, "topic": topic}
+        return {name: value for name, value in entries.items() if value is not None}
+
+    @property
     def is_of_places(self) -> bool:
         """Whether displacement and position are the same fields: these are places of the markers then."""
         moved, at = (self.origins.get(name, Origin()) for name in ("displacement", "position"))

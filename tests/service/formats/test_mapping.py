@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from service import formats
 from service.formats import assemble, mapping
 from service.formats.mapping import Origin, parse
 from service.formats.members import MARKS
@@ -144,3 +145,22 @@ def test_a_readers_own_marks_are_named_where_notes_are_checked() -> None:
 def test_as_many_fields_and_bytes_as_are_allowed_are_taken() -> None:
     assert len(parsed(topic="x" * 500, time=["a"] * 10_000).origins["time"].fields) == 10_000
     assert parse("{}".ljust(mapping.MAX_MAPPING_BYTES)).origins == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "value"),
+    [
+        ("frame table", "topic", "/tactile"),
+        ("frame table", "episode", 1),
+        ("parquet", "topic", "/tactile"),
+        ("hdf5", "notes", {"state": "slip"}),
+        ("mcap", "notes", {"state": "slip"}),
+        ("json", "element", "taxel"),
+        ("rosbag2", "episode", 1),
+    ],
+)
+def test_an_entry_of_another_kind_of_format_is_refused_by_name(name: str, entry: str, value: object) -> None:
+    entries = {"displacement": {"field": "moved"}}
+    formats.check_settings(name, {"mapping": json.dumps(entries)})
+    with pytest.raises(InvalidInput, match=f"mapping {entry} is .* with {name}; allowed: only for"):
+        formats.check_settings(name, {"mapping": json.dumps(entries | {entry: value})})
