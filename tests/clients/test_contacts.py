@@ -196,6 +196,15 @@ def test_a_no_says_why(make_model: Make) -> None:
         assert refusal.value.cause == cause
 
 
+def test_a_limit_that_the_expected_friction_just_needs_is_not_what_is_in_the_way(make_model: Make) -> None:
+    """A higher one would not help: it is the error of the slope that no force outweighs."""
+    unsure = make_model((0.5, 0.0, 0.0), np.diag([0.0, 0.0, 0.25]), degrees_of_freedom=np.inf)
+    for limit, cause in ((6.0 * (1.0 - 1e-9), "limit"), (6.0, "ignorance"), (6.0 * (1.0 + 1e-9), "ignorance")):
+        with pytest.raises(NoFeasibleForce) as refusal:
+            required_normal_force(unsure, 3.0, contact_area=AREA, normal_force_limit=limit)
+        assert refusal.value.cause == cause, limit
+
+
 def test_as_many_grasps_slip_under_load_and_torque_as_were_allowed(make_model: Make) -> None:
     """Round fingers whose elements draw one friction law and one scatter for all of them (200,000 draws)."""
     model = make_model(degrees_of_freedom=np.inf, scatter_degrees_of_freedom=np.inf)

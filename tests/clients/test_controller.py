@@ -312,6 +312,18 @@ def test_torque_is_borne_as_the_planner_has_it(slope: float, make_model: Make) -
 
 
 @pytest.mark.parametrize("flat", [True, False])
+def test_friction_under_a_force_is_what_the_planner_goes_by_under_it(flat: bool, make_model: Make) -> None:
+    """Elements of a round contact bear the cube root of its force, those of a flat one a fixed share."""
+    contact, model = Contact.flat(6e-5) if flat else SETTINGS.contact, model_of(make_model, 0.45, -0.8)
+    known = KnownFriction.of_model(model, dataclasses.replace(SETTINGS, contact=contact))
+    for load in (0.3, 1.0, 2.0):
+        grip = required_normal_force(
+            model, load, contacts=contact, slip_probability=SETTINGS.slip_probability, of="element"
+        )
+        assert known.bounds(grip.normal_force)[0] == pytest.approx(grip.friction_coefficient, rel=1e-9)
+
+
+@pytest.mark.parametrize("flat", [True, False])
 def test_a_contact_s_scatter_averages_over_its_elements(flat: bool, make_model: Make) -> None:
     scales = Scales(Scale(0.02, 20.0), Scale(0.03, 50.0), Scale(0.05, 500.0))
     model = dataclasses.replace(model_of(make_model, 0.45), scales=scales)

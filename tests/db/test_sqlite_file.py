@@ -1,3 +1,4 @@
+import os
 import shutil
 import sqlite3
 import subprocess
@@ -281,6 +282,25 @@ def test_an_older_copy_of_the_same_size_is_noticed_before_a_write(tmp_path: Path
         shutil.copyfile(tmp_path / "older", path)
         with pytest.raises(StorageUnavailable, match="deleted or replaced"):
             look(database)
+
+
+def test_the_log_of_a_file_that_was_replaced_is_kept_by_one_connection(tmp_path: Path) -> None:
+    """However often is looked for the file: each look would take descriptors otherwise, until there are none."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        database.checkpoint()
+        shutil.copyfile(path, tmp_path / "older")
+        look(database)
+        database.checkpoint()
+        look(database)
+        shutil.copyfile(tmp_path / "older", path)
+        opened = []
+        for _ in range(3):
+            with pytest.raises(StorageUnavailable, match="deleted or replaced"):
+                look(database)
+            opened.append(sum(str(tmp_path) in os.path.realpath(each) for each in Path("/proc/self/fd").iterdir()))
+    assert opened[0] == opened[1] == opened[2]
 
 
 def test_reading_the_header_leaves_the_locks_of_a_write_to_sqlite(tmp_path: Path) -> None:

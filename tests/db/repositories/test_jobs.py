@@ -1,15 +1,17 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from threading import Barrier
 
 import pytest
-from sqlalchemy import event
+from sqlalchemy import event, select
 
 from db.database import Database
 from db.errors import ClaimLost, NotFound
 from db.paging import Window
-from db.records import Claim, JobStatus
-from db.repositories import jobs, materials, runners
+from db.records import Claim, JobOrigin, JobStatus, NewModel
+from db.repositories import access_keys, friction_models, jobs, materials, runners
+from db.tables import FrictionModelRow
 
 
 @pytest.fixture
@@ -156,6 +158,29 @@ def test_a_failed_job_can_be_queued_as_if_new(database: Database, job: str, clai
         jobs.finish(session, mine, "failed", reason="bug")
         jobs.requeue(session, job)
         assert jobs.get(session, job) == before
+
+
+def test_a_job_that_is_done_again_leaves_its_models_to_one_that_ended_as_it_had(
+    database: Database, claim: Callable[[], Claim], new_model: Callable[..., NewModel]
+) -> None:
+    """Whoever looks up where a model is from finds what it found before."""
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+        for key_id in ("first", "second"):
+            access_keys.add(session, key_id, key_id, "upload", key_id)
+        origin = JobOrigin(requested_by="first", trace="00-1-2-00")
+        job = jobs.add(session, "fit", "bayes", material_id=material, seed=7, origin=origin)
+    mine = claim()
+    with database.write() as session:
+        friction_models.add(session, material, job, new_model())
+        seconds = {"friction_model": 0.1}
+        jobs.finish(session, mine, "refused", reason="too few samples", model_version=1, seconds=seconds)
+        before = jobs.get(session, job)
+        jobs.requeue(session, job, "second")
+        (found,) = session.scalars(select(FrictionModelRow.job_id)).all()
+        past, again = jobs.get(session, found), jobs.get(session, job)
+    assert past == replace(before, id=found, stage=None)
+    assert (found != job, again.status, again.requested_by) == (True, "queued", "second")
 
 
 def test_jobs_are_listed_newest_first(database: Database, job: str, claim: Callable[[], Claim]) -> None:

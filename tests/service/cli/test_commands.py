@@ -356,6 +356,14 @@ def test_a_log_is_replayed_as_a_live_stream_and_stored(
     assert f"frames             {len(log)}\n" in out
 
 
+@pytest.mark.parametrize("content", [b"", b"few", bytes(100_000)], ids=["nothing", "few bytes", "many"])
+def test_what_comes_on_standard_input_is_a_file_for_a_while(content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(content)))
+    with streaming._file(streaming.STANDARD_INPUT) as path:
+        assert path.read_bytes() == content
+    assert not path.exists()
+
+
 def test_a_frame_is_sent_when_it_is_due(ramps: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     log, now, due = formats.read(ramps[0]), [100.0], []
 
@@ -387,6 +395,18 @@ def test_what_becomes_of_an_upload_shows_in_the_exit_code(
     code, out, _ = run("upload", noise, ramps[1], "--url", url, "--json")
     first, second = json.loads(out)["uploads"]
     assert (code, first["status"], second["status"]) == (SERVICE_REFUSED, "rejected", "done")
+
+
+def test_what_speaks_against_a_log_is_said_when_it_is_uploaded(
+    run: Run, ramps: list[Path], url: str, tmp_path: Path
+) -> None:
+    log, pulling = formats.read(ramps[0]), tmp_path / "pulling.npz"
+    container.write(replace(log, force=-np.asarray(log.force)), pulling)
+    _, out, err = run("upload", pulling, ramps[0], "--url", url, "--json")
+    against, fine = json.loads(out)["uploads"]
+    assert "force pulls" in {each["name"] for each in against["findings"]}
+    assert "pulling.npz: force pulls: " in err
+    assert (fine["findings"], f"{ramps[0].name}: " in err) == ([], False)
 
 
 @pytest.mark.parametrize(
@@ -885,6 +905,13 @@ def test_accuracy_says_what_to_ask_for_of_logs(run: Run, ramps: list[Path], tmp_
     assert (tmp_path / "accuracy.png").stat().st_size > 10_000
     code, out, _ = run("accuracy", ramps[0])
     assert (code, "ask for" in out, "--method hierarchical" in out) == (0, True, True)
+
+
+def test_accuracy_says_what_to_ask_for_of_a_scene(run: Run) -> None:
+    code, out, _ = run("accuracy", "table1_condition1", "--seconds", 0.05, "--json")
+    (scene,) = json.loads(out)["subjects"]
+    assert (code, scene["subject"]) == (0, "Table I, condition 1")
+    assert {'--tier "closed form"', '--tier "beams"'} < {each["ask"] for each in scene["settings"]}
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,16 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from service.domain import await_job
+from db.database import Database
+from db.repositories import access_keys, jobs, materials
+from service.domain import await_job, keys
+from service.domain.errors import KeyEnded
 from service.domain.principal import ANONYMOUS
 from service.processes.fair_threads import FairThreads
 
@@ -83,3 +87,20 @@ def test_the_more_waits_of_a_client_there_are_the_more_seldom_each_looks(
     assert others == {ANONYMOUS.share: 8 * await_job.LOOKERS}, "its own wait is over"
     finished_at, _ = wait(None, None, "now", others=Counter({"somebody else": 1000}))
     assert finished_at == "now"
+
+
+@pytest.mark.parametrize("ends", ["expired", "revoked", None])
+def test_who_waits_is_told_nothing_more_once_his_key_has_ended(
+    database: Database, make: Callable[..., str], ends: str | None
+) -> None:
+    """However long before it he began to wait."""
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+        job = jobs.add(session, "fit", "ols", material_id=material)
+    key_id = str(keys.key_id(make(expires_at=keys.NO_KEY.created_at if ends == "expired" else None)))
+    if ends == "revoked":
+        with database.write() as session:
+            access_keys.revoke(session, key_id)
+    context: Any = SimpleNamespace(database=database)
+    with nullcontext() if ends is None else pytest.raises(KeyEnded):
+        assert await_job._look(context, job, key_id).id == job

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -9,11 +10,11 @@ import pytest
 
 from db.records import Finding
 from service.domain.doubtful_logs import with_doubts
-from service.domain.grasp_report import inspect_grasp, report_of_stored
+from service.domain.grasp_report import inspect_grasp, report_of_log, report_of_stored
 from service.domain.stored_results import encode_history, encode_samples
 from service.formatting import NOTHING
 from service.report.grasp import InspectedGrasp, grasp_report
-from service.report.page import render
+from service.report.page import Report, render
 from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from stiction_client.container import encode
@@ -40,6 +41,15 @@ def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(se
     assert any(step.startswith("Record next: press with") for step in report.steps)
     assert [section.heading for section in report.sections] == ["Slip over time", "Friction model", "What was detected"]
     assert len(list(report.pictures)) == 3
+
+
+def test_a_log_is_reported_as_it_is_seen(log: GraspLog, seen: InspectedGrasp) -> None:
+    """But for the seconds, which are those of each look."""
+
+    def without_seconds(report: Report) -> str:
+        return re.sub(r"[\d.]+ (ms|s)\b", "", f"{report.title} {report.lead} {report.facts} {report.steps}")
+
+    assert without_seconds(report_of_log(log, "grasp.npz")) == without_seconds(grasp_report(seen))
 
 
 def test_what_was_detected_stands_in_a_table(seen: InspectedGrasp) -> None:

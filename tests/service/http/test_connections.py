@@ -9,6 +9,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import uvicorn
@@ -338,6 +340,25 @@ def test_a_body_in_chunks_is_parsed_in_turns_and_comes_whole(
     assert b"received: %d\r\n" % (count * len(chunk)) in answers
     assert b"path: /behind" in answers
     assert len(turns_taken) > len(framed) // connections.H11_BYTES // 2
+
+
+def test_nothing_is_read_while_bytes_are_held_back() -> None:
+    """Although the server's h11 resumes reading past the object that is asked to pause it."""
+    asked: list[str] = []
+    transport: Any = SimpleNamespace(
+        pause_reading=lambda: asked.append("pause"), resume_reading=lambda: asked.append("resume")
+    )
+    flow = connections._HoldingFlow(transport)
+    flow.is_holding = True
+    flow.pause_reading()
+    flow.resume_reading()
+    assert (asked, flow.read_paused) == (["pause"], True)
+    transport.resume_reading()
+    flow.pause_reading()
+    assert asked == ["pause", "resume", "pause"]
+    flow.is_holding = False
+    flow.resume_reading()
+    assert (asked[3:], flow.read_paused) == (["resume"], False)
 
 
 def test_what_is_held_back_behind_an_early_answer_pauses_reading(connect: Connect, turns_taken: list[object]) -> None:

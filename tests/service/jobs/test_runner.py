@@ -2,6 +2,7 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from threading import Event
 from typing import Any
 
@@ -28,7 +29,7 @@ class ThreadExecutor:
     def __init__(self, do: Do) -> None:
         self._do, self.killed = do, Event()
         self.started = self.closed = 0
-        self.missing = None
+        self.missing: str | None = None
 
     async def start(self) -> None:
         self.started += 1
@@ -407,6 +408,54 @@ def test_a_runner_takes_no_jobs_of_a_newer_schema_and_says_so(
     working(lambda claim: finish(database, claim), note, workers=0)  # a server without workers
     assert [reason and "run a newer version" in reason for reason in said] == [True, True]
     assert {get(database, job_id).status for job_id in queued} == {"queued"}
+
+
+def test_whoever_waits_for_a_job_hears_its_end(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    """Everyone who waits for it, and nobody who waits for another."""
+    is_heard = Event()
+
+    def do(claim: Claim) -> None:
+        is_heard.wait(60.0)
+        finish(database, claim)
+
+    def listen(runner: JobRunner) -> None:
+        ends, other = [runner.ending(job) for job in queued], runner.ending("another")
+        assert [runner.ending(job) for job in queued] == ends
+        assert not any(end.is_set() for end in ends)
+        is_heard.set()
+        wait_until(lambda: all(end.is_set() for end in ends), "the ends to be heard")
+        assert not other.is_set()
+
+    working(do, listen)
+
+
+@pytest.mark.parametrize("executors", [0, 1, 3])
+def test_a_runner_says_how_many_workers_it_waits_for_and_why(database: Database, executors: int) -> None:
+    """Those that have begun are not waited for, and a server without workers waits for none."""
+    all_of_them = [ThreadExecutor(lambda _: None) for _ in range(executors)]
+    given = {"attempts": ATTEMPTS, "lease_seconds": 60.0, "poll_seconds": 60.0, "shutdown_seconds": 5.0}
+
+    async def live() -> list[str | None]:
+        runner = JobRunner(database, all_of_them, **given)  # type: ignore[arg-type]
+        said = [runner.missing]
+        for each in all_of_them:
+            each.missing = "no cluster"
+        said.append(runner.missing)
+        for each in all_of_them:
+            each.missing = None
+        await runner.start()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(20.0):
+                while runner.missing is not None:
+                    await asyncio.sleep(0.001)
+        said.append(runner.missing)
+        await runner.stop()
+        return said
+
+    waits = f"{executors} of {executors} workers warm up"
+    assert asyncio.run(live()) == ([waits, f"{waits}: no cluster", None] if executors else [None] * 3)
 
 
 def test_a_runner_is_dead_once_its_beats_stand_still() -> None:

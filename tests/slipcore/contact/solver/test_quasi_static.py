@@ -1,5 +1,7 @@
 """Histories of load against closed forms."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.solver.problem import ContactProblem, MaxwellBranch, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.step_equations import StepEquations
 
 FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
 SLIDING = FRICTION * FORCE
@@ -155,3 +158,38 @@ def test_steady_sliding_under_velocity_dependent_friction_is_known_from_the_step
         applications.append(result.applications.tangential)
     assert result.sliding
     assert applications[-1] <= 15  # without a memory of the speed 167
+
+
+def test_slip_that_goes_on_is_that_of_the_cells_that_slide_alone() -> None:
+    """An annulus of them, in a contact in the middle of a grid: what sticks or does not touch has no slip at all."""
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(32, 14e-3))
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    for force in (0.6 * SLIDING, 0.8 * SLIDING):
+        state, result = solver.step(state, shear(FORCE, force))
+    slides = state.slip.any(axis=0)
+    assert 0 < slides.sum() < result.contact.sum()
+    assert (result.at_limit[slides]).all()
+    assert not slides[~result.contact].any()
+    np.testing.assert_array_equal(state.slip[:, slides], result.slip[:, slides])
+
+
+def test_a_step_tells_how_long_it_took() -> None:
+    solver, begin = QuasiStatic(sphere_on(0.0), Grid.square(16, 14e-3)), time.perf_counter()
+    told = [result.seconds for result in solver.run([shear(FORCE, 0.0), shear(FORCE, 1.0)])]
+    assert min(told) > 0.0
+    assert sum(told) <= time.perf_counter() - begin
+
+
+def test_slip_is_looked_for_only_where_the_bodies_touch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A small contact on a large grid costs as a small grid does."""
+    boxes, slide = [], StepEquations._slide
+
+    def noted(self, normal, box, *rest):
+        boxes.append((normal.pressure > 0.0, box))
+        return slide(self, normal, box, *rest)
+
+    monkeypatch.setattr(StepEquations, "_slide", noted)
+    list(QuasiStatic(sphere_on(0.0), Grid.square(64, 40e-3)).run([shear(FORCE, 0.0), shear(FORCE, 1.0)]))
+    for touches, box in boxes:
+        assert touches[box].sum() == touches.sum() > 0
+        assert touches[box].size < 4 * touches.sum()

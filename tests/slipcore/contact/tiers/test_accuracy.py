@@ -1,6 +1,7 @@
 """Accuracy on request: estimates that hold, budgets that are kept."""
 
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -221,3 +222,53 @@ def test_a_finest_grid_that_falls_short_is_an_error_not_an_answer(monkeypatch: p
     monkeypatch.setattr(_AccuracySearch, "refuse_the_unreachable", lambda *_: None)
     with pytest.raises(NotConverged, match="accuracy"):
         simulate_to(SCENES["shear"].plan(), accuracy=0.005)
+
+
+class Halved:
+    """Logs told apart by their load steps a frame; two of them by ``largest(the fewer of them)``."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, largest: Callable[[int], float]) -> None:
+        monkeypatch.setattr(accuracy, "difference", lambda few, _: Difference(largest(few), 0.0, 0.0))
+
+    def search(self, target: float) -> _AccuracySearch:
+        runs = SimpleNamespace(run=lambda _, fidelity: fidelity.substeps, price=lambda *_: 7.0)
+        search = cast("_AccuracySearch", object.__new__(_AccuracySearch))
+        search.plan, search.target, search.runs = cast(Any, None), target, cast(Any, runs)
+        return search
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+def test_steps_are_halved_until_they_leave_little_enough(monkeypatch: pytest.MonkeyPatch, order: float) -> None:
+    """What n steps leave is n^-order: known beforehand, and so is how many are enough."""
+    halved, target = Halved(monkeypatch, lambda steps: 0.01 * steps**-order), 0.02
+    _, substeps, left = halved.search(target).more_steps(1, Difference(0.01 * 0.5**-order, 0.0, 0.0))
+    allowed = ACCURACY.step_share * target
+    assert left.largest == 0.01 * (substeps / 2) ** -order <= allowed < 0.01 * (substeps / 4) ** -order
+
+
+def test_more_steps_than_may_be_are_refused_with_what_the_most_would_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    halved, target = Halved(monkeypatch, lambda steps: 0.01 / steps), 1e-5
+    with pytest.raises(OutOfReach) as refusal:
+        halved.search(target).more_steps(1, Difference(0.02, 0.0, 0.0))
+    reached = 0.01 * 2 / ACCURACY.most_substeps / ACCURACY.step_share
+    assert (refusal.value.asked, refusal.value.least) == (target, pytest.approx(reached))
+
+
+def test_a_run_tells_which_part_of_it_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all the work that is to come, in proportion to steps and cells."""
+    told: list[float] = []
+    plan, coarse, fine = SCENES["shear"].plan(), Fidelity(10, 1), Fidelity(20, 1)
+
+    def ran(_: Plan, __: Fidelity, heard: Progress) -> None:
+        for part in (0.25, 0.5, 1.0):
+            heard(part)
+
+    monkeypatch.setattr(requests, "run", ran)
+    runs = requests.Runs(5e-3, np.inf, told.append)
+    works = [requests._work(runs._size(plan, fidelity)) for fidelity in (coarse, fine)]
+    runs.expect(plan, (coarse, fine))
+    runs.run(plan, coarse)
+    assert told == pytest.approx(np.array([0.25, 0.5, 1.0]) * works[0] / sum(works))
+    runs.expect(plan, (fine,))
+    runs.run(plan, fine)
+    assert told[3:] == pytest.approx((works[0] + np.array([0.25, 0.5, 1.0]) * works[1]) / sum(works))

@@ -1,0 +1,112 @@
+"""What a live stream does where its connection breaks, without a network: what is answered stands beforehand."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, ConnectionClosedError
+from websockets.frames import Close
+
+from stiction_client import AnswerTimedOut, ConnectionFailed, stream
+from stiction_client.stream import SlipStream
+
+OPENED = {"type": "opened", "session": "s"}
+BROKEN = ConnectionClosedError(None, None)
+Answers = list[dict[str, Any] | Exception]
+
+
+class Connection:
+    """Gives the answers that it was made with, and notes what it was sent."""
+
+    def __init__(self, answers: Answers) -> None:
+        self._answers, self.sent, self.is_open = iter(answers), list[dict[str, Any]](), True
+
+    def send(self, content: bytes) -> None:
+        self.sent.append(msgspec.msgpack.decode(content))
+
+    def recv(self, timeout: float, *, decode: bool) -> bytes:
+        assert (timeout, decode) == (stream.ANSWER_TIMEOUT, False)
+        answer = next(self._answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return msgspec.msgpack.encode(answer)
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[SlipStream, list[Connection]]]:
+    """A stream whose connections, one after the other, give these answers."""
+
+    def open_stream(*answers: Answers) -> tuple[SlipStream, list[Connection]]:
+        made: list[Connection] = []
+
+        @contextmanager
+        def connect(url: str, **_: Any) -> Iterator[Connection]:
+            assert url == "ws://service/v1/stream"
+            made.append(Connection([OPENED, *answers[len(made)]]))
+            yield made[-1]
+            made[-1].is_open = False
+
+        monkeypatch.setattr(stream, "connect", connect)
+        return SlipStream("http://service/", np.zeros((2, 2, 3)), 1e-6), made
+
+    return open_stream
+
+
+def send(live: SlipStream, count: int) -> None:
+    for k in range(count):
+        live.send(0.1 * k, np.full((2, 2, 3), k))
+
+
+def state(number: int) -> dict[str, Any]:
+    return {"type": "state", "number": number}
+
+
+def test_an_answer_that_was_lost_comes_on_the_next_connection(opened: Any) -> None:
+    """Which is told the last one that came, and all frames since."""
+    live, made = opened([state(0), BROKEN], [state(1), state(2)])
+    send(live, 3)
+    assert [answer["number"] for answer in live.answers()] == [0, 1, 2]
+    first, second = made
+    assert [message.get("number") for message in first.sent] == [None, 0, 1, 2]
+    assert second.sent[0] == {"type": "resume", "session": "s", "last": 0}
+    assert second.sent[1:] == first.sent[2:]
+    assert (first.is_open, second.is_open) == (False, True)
+
+
+def test_what_becomes_of_a_log_is_told_although_the_connection_broke(opened: Any) -> None:
+    stored = {"type": "finished", "grasp_log": {"id": "7"}}
+    live, made = opened([state(0), BROKEN], [stored])
+    send(live, 1)
+    assert live.finish(store=True) == {"id": "7"}
+    assert [message["type"] for message in made[1].sent] == ["resume", "finish"]
+    assert not made[1].is_open
+
+
+@pytest.mark.parametrize("code", stream.RESUMABLE)
+def test_a_server_that_stops_or_cannot_store_is_asked_once_more(opened: Any, code: int) -> None:
+    ended = ConnectionClosedError(Close(code, "later"), None)
+    live, made = opened([ended], [ended])
+    send(live, 1)
+    with pytest.raises(ConnectionFailed, match=rf"the service ended the stream: later \({code}\)"):
+        live.receive()
+    assert len(made) == 2
+
+
+def test_what_a_service_refuses_is_told_with_its_reason_and_not_asked_again(opened: Any) -> None:
+    refused: ConnectionClosed = ConnectionClosedError(Close(4401, "the key has ended"), None)
+    live, made = opened([refused])
+    send(live, 1)
+    with pytest.raises(ConnectionFailed, match=r"the key has ended \(4401\)"):
+        live.receive()
+    assert len(made) == 1
+
+
+def test_an_answer_that_is_late_may_be_waited_for_again(opened: Any) -> None:
+    live, made = opened([TimeoutError(), state(0)])
+    send(live, 1)
+    with pytest.raises(AnswerTimedOut, match="no answer within 30 s; the session goes on"):
+        live.receive()
+    assert (live.receive()["number"], len(made)) == (0, 1)
