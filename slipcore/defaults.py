@@ -659,10 +659,13 @@ class CheckOptions(Options):
     """Largest share of the elements in contact that reach the largest reading, to the last digit."""
     rest_share: Annotated[float, Option(0.0, 1.0, "-", "linear gels bear no larger share of the force then")] = 0.03
     """Of the contact's largest mean displacement, up to which its markers are at rest."""
+    rest_deviations: Annotated[float, Option(0.0, 100.0, "-", "least and largest of 100 readings lie 5 apart")] = 6.0
+    """Standard deviations of noise by which a contact's force at rest may be above its least, where markers are seen in
+    the plane only."""
     least_rest: Annotated[int, Option(2, 1000000, "frames", "a variance to a factor of two")] = 4
     """Frames at rest from which the forces in them count as the sensor's zero."""
     zero_share: Annotated[float, Option(0.0, 10.0, "-", "friction of 0.4 is off by 6 % then; scenes to 0.01")] = 0.025
-    """Largest root mean square of what elements read at rest, as a share of their normal force in the grasp."""
+    """Largest mean of what elements read at rest, as a share of their normal force in the grasp."""
     contact_likeness: Annotated[float, Option(0.0, 1.0, "-", "an offset is alike everywhere, about 0")] = 0.5
     """Correlation over elements of forces at rest with those of the grasp, above which they are a contact's."""
     least_held: Annotated[int, Option(3, 1000000, "frames", "a line and what it leaves")] = 8

@@ -3,7 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from slipcore.checks.rest import frames_at_rest, passing_noise
 from slipcore.checks.subject import Subject
 from slipcore.finding import Finding
 from slipcore.frames import FloatArray
@@ -17,12 +19,37 @@ def load_free_tangential_force(seen: Subject) -> Iterator[Finding]:
     free = _load_ratio(seen) < seen.limits.no_load
     if not free.any():
         return
-    sideways = (seen.forces.tangential * seen.forces.compressive)[held].sum(axis=(1, 2))
-    ratio = float(np.median((sideways / seen.total[held])[free]))
-    if ratio > seen.limits.sideways_share:
+    ratio, by_noise = _sideways_shares(seen, np.flatnonzero(held)[free])
+    if ratio > seen.limits.sideways_share > by_noise:
         evidence = f"elements feel {ratio:.2f} of the normal force sideways while the whole contact feels none"
         remedy = "calibrate normals and crosstalk by a pure press; single elements' f_t/f_n are not friction here"
         yield Finding("sideways force without load", evidence, remedy)
+
+
+def _sideways_shares(seen: Subject, frames: NDArray[np.intp]) -> tuple[float, float]:
+    """What elements feel sideways in these frames, over their normal force: less noise, and of noise alone."""
+    assert seen.forces is not None
+    pressed = seen.forces.compressive[frames]
+    sideways, count = seen.forces.tangential[frames] * pressed, pressed.sum(axis=(1, 2))
+    noise = _tangential_noise(seen)
+    share_of_noise = noise**2 * count.sum() / max(float((sideways**2).sum()), np.finfo(float).tiny)
+    tangential, by_noise = (
+        sideways.sum(axis=(1, 2)),
+        np.sqrt(0.25 * np.pi) * noise * count,
+    )  # its mean size in the plane
+    ratio, ratio_by_noise = (float(np.median(each / seen.total[frames])) for each in (tangential, by_noise))
+    return ratio * float(np.sqrt(max(1.0 - share_of_noise, 0.0))), ratio_by_noise
+
+
+def _tangential_noise(seen: Subject) -> float:
+    """Root mean square of what an element reads sideways without contact, N; of passing noise where no rest is seen."""
+    assert seen.forces is not None
+    assert seen.log.force is not None
+    rest = frames_at_rest(seen) & ~seen.history.contact.any(axis=(1, 2))
+    if rest.any():
+        return float(np.sqrt(np.mean(seen.forces.tangential[rest] ** 2)))
+    series = seen.log.force.reshape(len(seen.log), -1, 3).transpose(0, 2, 1)
+    return float(np.sqrt(2.0)) * passing_noise(seen, series)
 
 
 def _load_ratio(seen: Subject) -> FloatArray:

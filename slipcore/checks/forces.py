@@ -9,32 +9,39 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.checks.rest import frames_at_rest, touched_elements
 from slipcore.checks.subject import Subject
 from slipcore.finding import Finding
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
 
 ComplexArray = NDArray[np.complex128]
 
 
 def zero_offset(seen: Subject) -> Iterator[Finding]:
     """Forces where nothing touches: in the frames in which the markers have not moved yet, or no longer are."""
-    force, touched = _measured(seen), _touched(seen)
-    if force is None or not touched.any():
-        return
-    moved = np.linalg.norm(seen.log.displacement[:, touched].mean(axis=1), axis=-1)
-    rest = moved <= seen.limits.rest_share * moved.max(initial=0.0)
-    if not moved.any() or np.count_nonzero(rest) < seen.limits.least_rest:
+    force, rest = _measured(seen), frames_at_rest(seen)
+    if force is None or not rest.any():
         return
     read, held = np.median(force[rest], axis=0), np.median(seen.pressing[seen.held], axis=0)
     if _likeness(-read[..., 2], held) > seen.limits.contact_likeness:  # markers were zeroed during a touch
         return
-    noise = 0.5 * np.pi * force[rest][:, touched].var(axis=0, ddof=1) / np.count_nonzero(rest)  # of medians, squared
-    off = float(np.sqrt(max((read[touched] ** 2 - noise).mean(axis=0).sum(), 0.0)))
-    pressed = float(held[touched].mean())
+    touched = touched_elements(seen)
+    off, pressed = _alike(read[touched], force[rest][:, touched]), float(held[touched].mean())
     if 0.0 < seen.limits.zero_share * pressed < off:
         share = f"{off / pressed:.0%} of their force in the grasp"
-        evidence = f"elements read {1e3 * off:.2g} mN while nothing moves them, {share}"
+        evidence = f"elements read {1e3 * off:.2g} mN in the mean while nothing moves them, {share}"
         yield Finding("zero offset", evidence, "zero the sensor before each grasp, with nothing in touch")
+
+
+def _alike(read: FloatArray, readings: FloatArray) -> float:
+    """What elements read alike, N, beyond noise: of medians [k, 3] of ``readings`` [t, k, 3].
+
+    What differs from element to element, as noise that outlasts the rest does, moves friction nowhere in the mean.
+    """
+    lasting = read.var(axis=0, ddof=min(len(read) - 1, 1))
+    passing = 0.5 * np.pi * readings.var(axis=0, ddof=1).mean(axis=0) / len(readings)  # of medians
+    noise = np.maximum(lasting, passing) / len(read)
+    return float(np.sqrt(max((read.mean(axis=0) ** 2 - noise).sum(), 0.0)))
 
 
 def _likeness(read: FloatArray, held: FloatArray) -> float:
@@ -99,13 +106,6 @@ def _line(moved: ComplexArray, ratio: ComplexArray) -> tuple[tuple[complex, comp
     terms = np.stack([moved, np.ones_like(moved)], axis=-1)
     found = np.linalg.lstsq(terms, ratio, rcond=None)[0]
     return (complex(found[0]), complex(found[1])), float((ratio - terms @ found).std())
-
-
-def _touched(seen: Subject) -> BoolArray:
-    """Elements that touch in most of the frames held, [n, m]."""
-    if not seen.held.any():
-        return np.zeros(seen.log.grid, bool)
-    return np.asarray(seen.history.contact[seen.held].mean(axis=0) > 0.5)
 
 
 def _measured(seen: Subject) -> FloatArray | None:

@@ -186,6 +186,44 @@ def test_a_zero_is_told_without_what_noise_adds_to_it(long_ramp: GraspLog, noise
     assert float(told[1]) == pytest.approx(6.0, abs=0.4)
 
 
+@pytest.mark.parametrize("offset", [-0.01, 0.005, 0.01])
+def test_a_zero_that_is_off_is_found_where_markers_are_seen_in_the_plane_only(
+    long_ramp: GraspLog, offset: float
+) -> None:
+    """Pressed straight down they stay where they are."""
+    displacement = long_ramp.displacement * np.array([1.0, 1.0, 0.0])
+    planar = replace(long_ramp, displacement=displacement, normal=None)
+    assert "zero offset" not in names(planar)
+    assert "zero offset" in names(with_offset(planar, 0.0, 0.0, offset))
+
+
+def test_noise_that_outlasts_the_rest_is_no_offset(long_ramp: GraspLog) -> None:
+    """Each element's own, 3 mN, goes on for half a second; the rest has a fifth of one."""
+    rng, kept = np.random.default_rng(5), np.exp(-float(long_ramp.time[1] - long_ramp.time[0]) / 0.5)
+    force = np.array(long_ramp.force)
+    noise = rng.normal(0.0, 3e-3, force.shape[1:])
+    for frame in force:
+        noise = kept * noise + np.sqrt(1.0 - kept**2) * rng.normal(0.0, 3e-3, noise.shape)
+        frame += noise
+    assert "zero offset" not in names(with_force(long_ramp, force))
+
+
+@pytest.mark.parametrize(("pressed", "noise"), [(1.0, 2e-3), (0.3, 2e-3), (6.0, 2e-2)])
+def test_noise_of_a_light_grasp_is_no_sideways_force(pressed: float, noise: float) -> None:
+    schedule = RampSchedule(rest=0.2, press=0.5, settle=0.2, shear=2.0, hold=0.3)
+    made = tangential_ramp(
+        points=20,
+        pitch=0.75e-3,
+        normal_force=pressed,
+        schedule=schedule,
+        marker_noise=1e-6,
+        force_noise=noise,
+        seed=3,
+    )
+    for log in (made, made.take(slice(12, None))):  # also without rest
+        assert "sideways force without load" not in names(replace(log, truth=None))
+
+
 def test_a_zero_is_not_sought_where_the_markers_took_theirs_in_touch(long_ramp: GraspLog) -> None:
     """As with `rest=first` of a recording that begins pressed: forces are right there, and markers are at 0."""
     begun = long_ramp.take(slice(25, None))
