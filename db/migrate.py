@@ -1,6 +1,6 @@
 """Migrations of the database: upgrade, downgrade, current, check. Needs no file but the installed packages."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -10,6 +10,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.script.revision import RevisionError
 from alembic.util import CommandError
 from sqlalchemy import Connection, inspect, text
 from sqlalchemy.orm import Session
@@ -30,10 +31,15 @@ def upgrade(database: Database, revision: str = "head") -> None:
         command.upgrade(config, revision)
 
 
-def downgrade(database: Database, revision: str) -> None:
-    """Bring the database down to ``revision``; ``base`` removes every table with its data. Raises as ``upgrade``."""
+def downgrade(database: Database, revision: str, *, lose: bool = False) -> None:
+    """Bring the database down to ``revision``; ``base`` removes every table with its data.
+
+    Raises as ``upgrade``, and for rows that the older schema has no place for: for some always, for the others unless
+    they are to be lost (``lose``).
+    """
     _refuse_others(database)
     with _migrating(database) as config:
+        _refuse_losses(config.attributes["connection"], revision, lose=lose)
         command.downgrade(config, revision)
 
 
@@ -71,6 +77,29 @@ def check(database: Database) -> None:
         differences = compare_metadata(context, Base.metadata)
     if differences:
         raise SchemaMismatch("tables differ from the code's: " + "; ".join(map(str, differences)))
+
+
+def _refuse_losses(connection: Connection, revision: str, *, lose: bool) -> None:
+    """By what each migration on the way back says of itself."""
+    found = MigrationContext.configure(connection).get_current_revision()
+    undone = [each.module for each in _scripts().iterate_revisions(found, revision, select_for_downgrade=True)]
+    stops, losses = (
+        [told for module in undone for told in _counted(connection, getattr(module, name, ()))]
+        for name in ("STOPS_THE_WAY_BACK", "LOST_ON_THE_WAY_BACK")
+    )
+    connection.rollback()  # the migrations begin a transaction of their own
+    if stops:
+        what = f"{', '.join(stops)}, for which the older schema has no word"
+        raise SchemaMismatch(f"migration refused: {what}; allowed: none of these")
+    if losses and not lose:
+        what = f"{', '.join(losses)} would be lost"
+        raise SchemaMismatch(f"migration refused: {what}; allowed: none, or --lose, best after `stiction db backup`")
+
+
+def _counted(connection: Connection, queries: Iterable[tuple[str, str]]) -> Iterator[str]:
+    for what, query in queries:
+        if count := connection.execute(text(query)).scalar():
+            yield f"{count} {what}"
 
 
 def _difference(found: str | None) -> str:
@@ -123,7 +152,7 @@ def _migrating(database: Database) -> Iterator[Config]:
         config.attributes["connection"] = connection
         try:
             yield config
-        except CommandError as error:
+        except (CommandError, RevisionError) as error:
             known = ", ".join(script.revision for script in _scripts().walk_revisions())
             raise SchemaMismatch(f"migration refused: {error}; allowed: head, base, {known}") from error
 

@@ -8,6 +8,13 @@ down_revision = None
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (
+    ("materials", "SELECT count(*) FROM materials"),
+    ("sensors", "SELECT count(*) FROM sensors"),
+    ("grasp logs", "SELECT count(*) FROM grasp_logs"),
+    ("friction models", "SELECT count(*) FROM friction_models"),
+)
+
 CURRENT_ONLY = {"sqlite_where": sa.text("current"), "postgresql_where": sa.text("current")}
 NO_MATERIAL = {"sqlite_where": sa.text("material_id IS NULL"), "postgresql_where": sa.text("material_id IS NULL")}
 

@@ -8,6 +8,8 @@ down_revision = "0001"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (("access keys", "SELECT count(*) FROM access_keys"),)
+
 
 def upgrade() -> None:
     op.create_table(

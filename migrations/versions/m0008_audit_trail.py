@@ -8,6 +8,8 @@ down_revision = "0007"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (("entries of the audit trail", "SELECT count(*) FROM audit_entries"),)
+
 SQLITE = (
     "CREATE TRIGGER audit_entries_stay_as_they_are BEFORE UPDATE ON audit_entries "
     "BEGIN SELECT RAISE(ABORT, 'audit entries are never changed'); END",

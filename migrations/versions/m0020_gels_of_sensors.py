@@ -8,6 +8,10 @@ down_revision = "0019"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (
+    ("descriptions of sensors' gels", "SELECT count(*) FROM sensors WHERE young_modulus IS NOT NULL"),
+)
+
 COLUMNS = ("young_modulus", "poisson_ratio", "thickness", "marker_depth")
 
 

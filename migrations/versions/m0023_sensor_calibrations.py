@@ -8,6 +8,8 @@ down_revision = "0022"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (("calibrations of sensors", "SELECT count(*) FROM sensor_calibrations"),)
+
 TABLE = "sensor_calibrations"
 
 

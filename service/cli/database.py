@@ -55,12 +55,15 @@ def upgrade(database_url: Url = None) -> None:
 def downgrade(
     revision: Annotated[str, typer.Argument(help="Revision to go back to; `base` removes every table and its data.")],
     database_url: Url = None,
+    lose: Annotated[
+        bool, typer.Option("--lose", help="Also where that loses what is stored: it is named, with how much, without.")
+    ] = False,
 ) -> None:
-    """Bring the database back to an older schema."""
+    """Bring the database back to an older schema; what that would lose is named, and refused with exit code 3."""
     from db import migrate
 
     with opened(database_url) as database:
-        migrate.downgrade(database, revision)
+        migrate.downgrade(database, revision, lose=lose)
         typer.echo(f"at revision {migrate.current(database)}")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from alembic.script import ScriptDirectory
-from sqlalchemy import inspect, text
+from sqlalchemy import inspect, text, update
 
 from db import migrate
 from db.database import Database
@@ -30,7 +30,7 @@ from db.repositories import (
     runners,
     stores,
 )
-from db.tables import Base, MaterialOwnerRow, now
+from db.tables import Base, DetectionRow, GraspLogRow, MaterialOwnerRow, SensorRow, now
 
 pytestmark = pytest.mark.usefixtures("real_migrations")
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -122,7 +122,7 @@ def test_migrations_go_down_and_up_with_data_in_every_table(
         counts = {name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar() for name in tables(database)}
     assert set(counts.values()) == {1}
     for _ in REVISIONS:
-        migrate.downgrade(database, "-1")
+        migrate.downgrade(database, "-1", lose=True)
     assert tables(database) == set()
     migrate.upgrade(database)
     fill(database, new_log(material_id=1), detection, samples, new_model())
@@ -141,7 +141,7 @@ def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_
     with empty_database.write() as session:
         assert materials.find_id(session, "paper") == 1
         session.execute(text("UPDATE materials SET merged_into_id = 1 WHERE id = 2"))
-    with pytest.raises(RuntimeError, match="1 materials were merged"):
+    with pytest.raises(SchemaMismatch, match="migration refused: 1 materials were merged"):
         migrate.downgrade(empty_database, "0002")
     assert migrate.current(empty_database) == "0003"
 
@@ -159,7 +159,7 @@ def test_a_database_of_before_claims_keeps_its_jobs_and_models(
         unwanted = jobs.add(session, "fit", "ols", material_id=material)
         jobs.cancel(session, unwanted, "no longer wanted")
         models = friction_models.versions(session, material, None)
-    migrate.downgrade(database, "0004")
+    migrate.downgrade(database, "0004", lose=True)
     with database.read() as session:
         assert set(session.execute(text("SELECT status, reason FROM jobs")).all()) == {
             ("running", None),  # until an older server takes it up
@@ -193,7 +193,7 @@ def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell
         job = jobs.add(session, "fit", "hierarchical", material_id=1)
         structured = replace(new_model("hierarchical", scales=scales), diagnostics=told)
         friction_models.add(session, 1, job, structured)
-    migrate.downgrade(database, "0014")
+    migrate.downgrade(database, "0014", lose=True)
     migrate.upgrade(database)
     with database.read() as session:
         hierarchical, ols = friction_models.versions(session, 1)
@@ -214,7 +214,7 @@ def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
         ingest = jobs.list_all(session, Window("created_at"))[0]
         friction_models.add(session, 1, ingest.id, new_model("hierarchical"))
         models = friction_models.versions(session, 1)
-    migrate.downgrade(database, "0017")
+    migrate.downgrade(database, "0017", lose=True)
     migrate.upgrade(database)
     with database.read() as session:
         assert friction_models.versions(session, 1) == models
@@ -345,10 +345,45 @@ def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callabl
         assert path.name in str(seen.value)
 
 
+@pytest.mark.parametrize(
+    ("revision", "told"),
+    [
+        ("0022", "1 calibrations of sensors would be lost"),
+        ("0016", "1 calibrations of sensors, 1 descriptions of sensors' gels, .*1 logs with findings would be lost"),
+        ("0007", "1 owners of materials, .*1 entries of the audit trail would be lost"),
+        (
+            "base",
+            "1 withdrawals of grasp logs, 1 aliases of materials, .*1 grasp logs, 1 friction models would be lost",
+        ),
+    ],
+)
+def test_what_the_way_back_would_lose_is_named_and_kept(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+    revision: str,
+    told: str,
+) -> None:
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    found = [{"name": "zero offset", "evidence": "", "remedy": ""}]
+    with database.write() as session:
+        session.execute(update(DetectionRow).values(findings=found))
+        session.execute(update(GraspLogRow).values(withdrawn_at=now(), withdrawn_because="wet"))
+        session.execute(update(SensorRow).values(young_modulus=1e5, poisson_ratio=0.45))
+        materials.add_alias(session, 1, "A4")
+    before = migrate.current(database)
+    with pytest.raises(SchemaMismatch, match=told):
+        migrate.downgrade(database, revision)
+    assert migrate.current(database) == before
+    migrate.downgrade(database, revision, lose=True)
+
+
 def test_a_key_that_expires_stops_the_way_back(database: Database) -> None:
     with database.write() as session:
         access_keys.add(session, "0" * 12, "guest", "read", "0" * 64, expires_at=now() + timedelta(days=1))
-    with pytest.raises(RuntimeError, match="1 access keys expire"):
+    with pytest.raises(SchemaMismatch, match="migration refused: 1 access keys expire"):
         migrate.downgrade(database, "0009")
     with database.write() as session:
         access_keys.revoke(session, "0" * 12)
