@@ -8,14 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.contact.defaults import NORMAL, TINY
+from slipcore.contact.defaults import TINY
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.contact.elasticity.transform import Compiled, convolve
 from slipcore.frames import BoolArray, FloatArray
 
-# What compiled loops hold fixed; what each means stands in the table.
-_MEMORY, _ROUNDING = NORMAL.memory, NORMAL.energy_rounding
-_REDUCTION, _ITERATIONS, _TINY = NORMAL.reduction, NORMAL.iterations, TINY
+_TINY = TINY  # what compiled loops hold fixed
 
 
 class Relaxed(NamedTuple):
@@ -37,18 +35,20 @@ def relaxed(
     height: FloatArray,
     given: tuple[bool, float, float],
     by: tuple[Compiled, Compiled],
-    bounds: tuple[float, int],
+    bounds: tuple[float, int, int, float],
+    relaxation: tuple[float, int],
 ) -> Relaxed:
     """Pressure [1, ny, nx] from a guess of it, for a gap between undeformed bodies of ``height`` [1, ny, nx] m.
 
     ``given``: whether that is the sum of pressures, rather than the approach; the value, and the lowest height. ``by``:
-    operator and preconditioner; ``bounds``: tolerance, and most active sets.
+    operator and preconditioner; ``bounds``: tolerance, most active sets, over how many energies may climb, and what is
+    no climb; ``relaxation``: reduction of each set's residual, and most conjugate gradients.
     """
-    (balanced, value, lowest), (operator, _), (tolerance, most) = given, by, bounds
+    (balanced, value, lowest), (operator, _), (tolerance, most, memory, rounding) = given, by, bounds
     pressure, displacement, response = start.copy(), np.empty_like(start), np.empty_like(start)
     _make_feasible(pressure, height, given)
     convolve(pressure, displacement, operator)
-    energies, applications = np.full(_MEMORY, _energy(pressure, displacement, height, given)), 1
+    energies, applications = np.full(memory, _energy(pressure, displacement, height, given)), 1
     residual, approach = np.inf, value
     for iteration in range(most):
         if balanced:
@@ -57,18 +57,18 @@ def relaxed(
         residual = _violation(pressure, gap) / max(approach - lowest, _TINY)
         if residual <= tolerance and approach > lowest:
             return Relaxed(pressure, displacement, approach, residual, iteration, applications)
-        change, response, needed = _relax((pressure > 0.0) | (gap < 0.0), gap, balanced, by)
+        change, response, needed = _relax((pressure > 0.0) | (gap < 0.0), gap, balanced, by, relaxation)
         trial, applications = pressure + change, applications + needed
         if _make_feasible(trial, height, given):
             convolve(trial - pressure, response, operator)
             applications += 1
         moved = displacement + response
         energy, highest = _energy(trial, moved, height, given), energies.max()
-        if energy > highest + _ROUNDING * abs(highest):
+        if energy > highest + rounding * abs(highest):
             trial, moved = _descend(pressure, displacement, gap, (approach - lowest, height, given, operator))
             energy, applications = _energy(trial, moved, height, given), applications + 1
         pressure, displacement = trial, moved
-        energies[iteration % _MEMORY] = energy
+        energies[iteration % memory] = energy
     return Relaxed(pressure, displacement, approach, residual, most, applications)
 
 
@@ -123,12 +123,16 @@ def _make_feasible(pressure: FloatArray, height: FloatArray, given: tuple[bool, 
 
 @compiled
 def _relax(
-    active: BoolArray, gap: FloatArray, balanced: bool, by: tuple[Compiled, Compiled]
+    active: BoolArray,
+    gap: FloatArray,
+    balanced: bool,
+    by: tuple[Compiled, Compiled],
+    relaxation: tuple[float, int],
 ) -> tuple[FloatArray, FloatArray, int]:
     """A change of pressure that closes the gap on the active cells, at the same total force if that is given, and its
     displacement, by conjugate gradients; and how often they took the operator.
     """
-    operator, preconditioner = by
+    (operator, preconditioner), (reduction, most) = by, relaxation
     change, response, residual = np.zeros_like(gap), np.zeros_like(gap), gap.copy()
     improved, image = np.empty_like(gap), np.empty_like(gap)
     _restrict(residual, active, balanced)
@@ -137,7 +141,7 @@ def _relax(
     direction = -improved
     size = first = _inner(residual, improved)
     count = 0
-    while count < _ITERATIONS and size > 0.0:
+    while count < most and size > 0.0:
         convolve(direction, image, operator)
         _advance(change, response, residual, direction, image, size / _inner(direction, image))
         _restrict(residual, active, balanced)
@@ -145,7 +149,7 @@ def _relax(
         _restrict(improved, active, balanced)
         before, size = size, _inner(residual, improved)
         count += 1
-        if size <= _REDUCTION**2 * first:
+        if size <= reduction**2 * first:
             break
         _turn(direction, improved, size / before)
     return change, response, count

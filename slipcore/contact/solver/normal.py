@@ -153,11 +153,14 @@ def _relax(
     """Active sets on one box."""
     value = approach if force is None else force / operator.grid.cell_area
     assert value is not None
-    given, by = (
+    found = relaxed(
+        np.ascontiguousarray(start)[None],
+        np.ascontiguousarray(height)[None],
         (force is not None, value, float(height.min())),
         (operator.normal_compiled, operator.normal_inverse.compiled),
+        (tolerance, most, NORMAL.memory, NORMAL.energy_rounding),
+        (NORMAL.reduction, NORMAL.iterations),
     )
-    found = relaxed(np.ascontiguousarray(start)[None], np.ascontiguousarray(height)[None], given, by, (tolerance, most))
     operator.count.normal += found.applications
     if found.iterations == most:
         raise NotConverged("normal contact", found.residual, tolerance, most)
