@@ -226,18 +226,18 @@ def compare(
             )
 
 
-def measure(worker: Worker, present: dict[str, str], grids: list[int]) -> list[Run]:
-    """Every problem on every grid; partial slip on those from 128 to 256 cells."""
+def measure(worker: Worker, present: dict[str, str], grids: list[int], problems: list[str]) -> list[Run]:
+    """The problems on every grid; partial slip on those from 128 to 256 cells."""
     ours, runs = Ours(), []
     normal = {OURS: ours.solve} | {p: worker.solve for p in PEERS[:4] if p in present}
     slip = {f"{OURS} friction": ours.solve} | {p: worker.solve for p in PEERS[4:] if p in present}
     closed = CattaneoMindlin(HERTZ, FRICTION, SHARE * FRICTION * FORCE)
-    for cells in (cells for cells in grids if 128 <= cells <= 256):
+    for cells in (cells for cells in grids if 128 <= cells <= 256 and "partial slip" in problems):
         _, tight = ours.friction(cells, 1e-11)
         exact = closed.traction(np.hypot(*ours.prepared(cells)[0].points()))
         runs += _printed(compare("partial slip", cells, slip, tight, exact, ROUNDS if cells < 256 else 1))
     ours.known.clear()  # set-up is timed too
-    for cells in grids:
+    for cells in (cells for cells in grids if "normal contact" in problems):
         grid, operators, height = ours.prepared(cells)
         tight = solve_normal(operators, grid, height, force=FORCE, tolerance=1e-12).pressure
         del ours.known[cells]
@@ -329,6 +329,7 @@ def main() -> None:
     parser.add_argument("--peers-python", default=sys.executable, help="interpreter that has the peers")
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--cells", type=int, nargs="+", default=[64, 128, 256, 512], help="cells a side of the grids")
+    parser.add_argument("--problems", nargs="+", choices=[*TOLERANCES], default=[*TOLERANCES])
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     with Worker(options.peers_python) as worker:
@@ -336,7 +337,7 @@ def main() -> None:
         for peer in PEERS:
             if peer not in present:
                 print(f"{peer} is not installed for {options.peers_python}: left out")
-        runs = measure(worker, present, options.cells)
+        runs = measure(worker, present, options.cells, options.problems)
     for target in TARGETS:
         print("\n" + table(runs, target))
     print("\n" + features())
