@@ -94,6 +94,8 @@ class SupportDefaults(Options):
     """Least number of its values that the data are taken to determine of a node."""
     steps: Annotated[int, Option(0, 100, "rows", "bound")] = 6
     """Most rows by which a contact then grows or shrinks."""
+    levels: Annotated[int, Option(0, 100, "levels", "an ellipse, a cone, a block and a stadium")] = 8
+    """Of pressure at which the rim of a contact is tried to be cut, from a row less to a row more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

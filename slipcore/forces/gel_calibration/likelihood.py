@@ -145,9 +145,9 @@ def evaluate_gel(
     for press, contact, observation in zip(presses.each, contacts, presses.observations(elasticity), strict=True):
         if seek != "nothing":
             contact = _better(observation, press.data, presses.nodes, contact, seek)
-        contact = _as_strong(observation, press.data, presses.nodes, contact)
+        of_press, contact = _as_strong(observation, press.data, presses.nodes, contact)
         found.append(contact)
-        probability += log_evidence(observation, press.data, presses.nodes, contact.support.ravel(), contact.prior)
+        probability += of_press
         total, deviation, misfit = _resultant(observation, press.data, presses.nodes, contact)
         yields.append((total, deviation))
         misfits.append(misfit)
@@ -164,17 +164,20 @@ def _better(
     for _ in range(1 if seek == "support" else GEL_CALIBRATION.alternations):
         if seek == "both":
             prior = choose_prior(observation, data, nodes, support.ravel(), first=prior.smoothness)
-        before, support = support, better_support(observation, data, nodes, support, prior)
+        before, support = support, better_support(observation, data, nodes, support, prior.smoothness)
         if (before == support).all():
             break
     return PressContact(support, prior)
 
 
-def _as_strong(observation: ObservationModel, data: FloatArray, nodes: Nodes, contact: PressContact) -> PressContact:
-    """With tractions as strong as the press is under this gel: how strong is no reason to prefer one."""
-    smoothness, support = contact.prior.smoothness, contact.support.ravel()
-    prior = choose_prior(observation, data, nodes, support, first=smoothness, strength_alone=True)
-    return PressContact(contact.support, prior)
+def _as_strong(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, contact: PressContact
+) -> tuple[float, PressContact]:
+    """A press's log probability with tractions as strong as it is under this gel, and the contact with these: how
+    strong is no reason to prefer one.
+    """
+    probability, prior = log_evidence(observation, data, nodes, contact.support.ravel(), contact.prior.smoothness)
+    return probability, PressContact(contact.support, prior)
 
 
 def _resultant(

@@ -28,6 +28,17 @@ class ObservationModel:
     response: FloatArray
     noise: FloatArray
 
+    def whitened(self, nodes: BoolArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The response [m, 3, j] of some nodes, the j chosen ones, and data [m], divided by the noise."""
+        return self.response[:, :, nodes] / self.noise[:, None, None], data / self.noise
+
+    def within(self, nodes: BoolArray, data: FloatArray) -> tuple["ObservationModel", FloatArray]:
+        """The same of some nodes alone, and data [m]: in no more than these have tractions, each of noise 1."""
+        response, reached = condensed(*self.whitened(nodes, data))
+        whole = np.zeros((len(reached), 3, len(nodes)))
+        whole[:, :, nodes] = response
+        return ObservationModel(whole, np.ones(len(reached))), reached
+
     def on(self, nodes: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Q [m, r] and R [r, 3, j] of the whitened response of some nodes, the j chosen ones."""
         used = (self.response[:, :, nodes] / self.noise[:, None, None]).reshape(len(self.noise), -1)
@@ -38,7 +49,7 @@ class ObservationModel:
         """Of the whitened response of some nodes; infinite where data are fewer than tractions."""
         _, r = self.on(nodes)
         square = r.reshape(len(r), -1)
-        return Spectrum.of(square).condition if np.isfinite(self.noise).sum() >= square.shape[1] else np.inf
+        return float(np.linalg.cond(square)) if np.isfinite(self.noise).sum() >= square.shape[1] else np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,16 +125,29 @@ def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: 
     return TractionFit(support, operator, whitened[:, : 3 * j], root)
 
 
+def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same problem in no more data than it has unknowns, by QR: without the part of the data that none reaches."""
+    m, _, k = response.shape
+    if m <= 3 * k:
+        return response, data
+    both = np.column_stack((response.reshape(m, 3 * k), data))
+    upper = scipy.linalg.qr(both, mode="r", overwrite_a=True, check_finite=False)[0][: 3 * k]
+    return np.asarray(upper[:, :-1].reshape(3 * k, 3, k)), np.asarray(upper[:, -1])
+
+
 def log_evidence(
-    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, prior: TractionPrior
-) -> float:
-    """Log probability of data [m] if traction acts on a ``support`` [k], without what no support changes."""
-    q, r = observation.on(support)
-    root = prior.strength * factors(nodes.places()[support], nodes.grid.pitch[0], prior.smoothness)
-    stacked = np.concatenate((_times(r, root), np.eye(3 * root.shape[1])))
-    inner, outer = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
-    explained = inner[: len(r)].T @ (q.T @ (data / observation.noise))
-    return float(0.5 * explained @ explained - np.sum(np.log(np.abs(np.diag(outer)))))
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
+) -> tuple[float, TractionPrior]:
+    """Log probability of data [m] if traction acts on a ``support`` [k], without what no support changes: under the
+    prior of this shape with the strength that makes it largest, and that prior.
+
+    Supports are compared each by its own strength: the same force on fewer nodes takes a greater pressure on each, so
+    that the strength of a wide contact would speak against all smaller ones.
+    """
+    response, reached = condensed(*observation.whitened(support, data))
+    spectrum = Spectrum.of(_times(response, factors(nodes.places()[support], nodes.grid.pitch[0], shape)), reached)
+    strength = spectrum.choose(0.0, len(reached), "evidence")
+    return spectrum.log_evidence(strength) + 0.5 * float(spectrum.y @ spectrum.y), TractionPrior(shape, strength)
 
 
 def choose_prior(
@@ -139,16 +163,15 @@ def choose_prior(
 
     ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept.
     """
-    q, r = observation.on(support)
+    r, y = condensed(*observation.whitened(support, data))
     whitened = data / observation.noise
-    y = q.T @ whitened
     rest, count = max(float(whitened @ whitened - y @ y), 0.0), int(np.isfinite(observation.noise).sum())
     places, pitch = nodes.places()[support], nodes.grid.pitch[0]
 
     def evaluate(shape: Smoothness, by: Criterion) -> tuple[float, float]:
-        spectrum = Spectrum.of(_times(r, factors(places, pitch, shape)))
-        strength = spectrum.choose(y, rest, count, by)
-        return spectrum.log_evidence(y, strength), strength
+        spectrum = Spectrum.of(_times(r, factors(places, pitch, shape)), y)
+        strength = spectrum.choose(rest, count, by)
+        return spectrum.log_evidence(strength), strength
 
     best = usual() if first is None else first
     if strength_alone:

@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import STRENGTH
+from slipcore.forces.inverse.singular_values import singular_components
 from slipcore.frames import FloatArray
 
 Criterion = Literal["evidence", "gcv", "discrepancy"]
@@ -20,34 +21,27 @@ Criterion = Literal["evidence", "gcv", "discrepancy"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spectrum:
-    """Singular values ``s`` [r] and their directions ``u`` [m, r] of data."""
+    """Singular values ``s`` [r], largest first, and the components ``y`` [r] of data along their directions."""
 
-    u: FloatArray
     s: FloatArray
+    y: FloatArray
 
     @classmethod
-    def of(cls, whitened: FloatArray) -> "Spectrum":
-        """Of data that are already divided by their noise, [m, p]."""
-        u, s, _ = np.linalg.svd(whitened, full_matrices=False)  # SciPy's stops all other threads meanwhile
-        return cls(u, s)
+    def of(cls, whitened: FloatArray, data: FloatArray) -> "Spectrum":
+        """Of a response [m, p] and data [m] that are already divided by the noise of these."""
+        return cls(*singular_components(whitened, data))
 
-    @property
-    def condition(self) -> float:
-        """Largest over smallest singular value."""
-        return float(self.s[0] / self.s[-1]) if self.s[-1] > 0.0 else np.inf
-
-    def choose(self, data: FloatArray, rest: float, count: int, criterion: Criterion) -> float:
-        """The strength that a criterion prefers for whitened data [m], up to ``STRENGTH.largest``.
+    def choose(self, rest: float, count: int, criterion: Criterion) -> float:
+        """The strength that a criterion prefers, up to ``STRENGTH.largest``.
 
         ``rest``: sum of squares of further data that no coefficient reaches; ``count`` of all data. Raises
         ``InvalidInput`` for a criterion unknown.
         """
         if criterion not in CRITERIA:
             raise InvalidInput("criterion", criterion, ", ".join(CRITERIA))
-        y = data @ self.u
 
         def price(log_strength: float) -> float:
-            return CRITERIA[criterion](self.s, y, rest, count, float(np.exp(log_strength)))
+            return CRITERIA[criterion](self.s, self.y, rest, count, float(np.exp(log_strength)))
 
         least = min(STRENGTH.least_signal / self.s[0], STRENGTH.least_share * STRENGTH.largest)
         grid = np.linspace(np.log(least), np.log(STRENGTH.largest), STRENGTH.grid)
@@ -55,9 +49,9 @@ class Spectrum:
         around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
         return float(np.exp(minimize_scalar(price, bounds=around, method="bounded").x))
 
-    def log_evidence(self, data: FloatArray, strength: float) -> float:
-        """Log probability of whitened data [m], without what no choice changes."""
-        return -_evidence(self.s, data @ self.u, 0.0, len(data), strength)
+    def log_evidence(self, strength: float) -> float:
+        """Log probability of the data, without what no choice changes."""
+        return -_evidence(self.s, self.y, 0.0, len(self.y), strength)
 
 
 def _evidence(s: FloatArray, y: FloatArray, rest: float, _count: int, strength: float) -> float:

@@ -7,15 +7,15 @@ node's variance is estimated with its neighbours' (Fang et al., IEEE Trans. Sign
 is found so; how much comes from a fit on that support.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
-import scipy.linalg
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
 from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.inverse.covariance import covariance_root, solve_root
-from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, log_evidence
+from slipcore.forces.inverse.fit import ObservationModel, condensed, fit, log_evidence
+from slipcore.forces.inverse.prior import Smoothness
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
@@ -47,22 +47,49 @@ def relevant_nodes(observation: ObservationModel, data: FloatArray, candidates: 
 
 
 def better_support(
-    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, prior: TractionPrior
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
 ) -> BoolArray:
-    """The support [ny, nx] that explains data [m] best among those that grow, shrink or close step by step from one."""
-
-    def evidence(of: BoolArray) -> float:
-        return log_evidence(observation, data, nodes, of.ravel(), prior)
-
-    best, most = support, evidence(support)
+    """The support [ny, nx] that explains data [m] best, under priors of this shape, among those that grow, shrink or
+    close row by row from one, and those whose rim is then cut where pressures are.
+    """
+    near = observation.within(binary_dilation(support).ravel(), data)
+    best, most = _most_probable([support], *near, nodes, shape)
     for _ in range(SUPPORT.steps):
-        others = [change(best) for change in STEPS]
-        judged = [(evidence(other), i) for i, other in enumerate(others) if other.any() and (other != best).any()]
-        found, which = max(judged, default=(-np.inf, 0))
+        others = [other for change in STEPS if (other := change(best)).any() and (other != best).any()]
+        better, found = _most_probable(others or [best], *near, nodes, shape)
         if found <= most:
             break
-        best, most = others[which], found
-    return best
+        best, most = better, found
+        near = observation.within(binary_dilation(best).ravel(), data)
+    better, found = _most_probable([*cut(*near, nodes, best, shape)] or [best], *near, nodes, shape)
+    return better if found > most else best
+
+
+def _most_probable(
+    supports: list[BoolArray], observation: ObservationModel, data: FloatArray, nodes: Nodes, shape: Smoothness
+) -> tuple[BoolArray, float]:
+    """That of some supports which data speak for most, and their log probability by it."""
+    evidence = [log_evidence(observation, data, nodes, support.ravel(), shape)[0] for support in supports]
+    return supports[int(np.argmax(evidence))], max(evidence)
+
+
+def cut(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
+) -> Iterator[BoolArray]:
+    """Supports [ny, nx] between one without its outermost row and one with a row more, by how strongly their nodes are
+    pressed in a fit on the widest: contacts end between nodes, and not alike on all sides.
+    """
+    least, wide = binary_erosion(support), binary_dilation(support)
+    of_wide = fit(observation, nodes, wide.ravel(), log_evidence(observation, data, nodes, wide.ravel(), shape)[1])
+    pressure = np.full(support.shape, -np.inf)
+    pressure[wide] = (of_wide.operator @ data)[2 * int(wide.sum()) :]
+    rim = np.flatnonzero(wide & ~least)
+    strongest = rim[np.argsort(-pressure.flat[rim], kind="stable")]
+    for count in np.unique(np.linspace(0, len(rim), SUPPORT.levels + 2)[1:-1].round().astype(int)):
+        other = least.copy()
+        other.flat[strongest[:count]] = True
+        if other.any():
+            yield other
 
 
 def widened(nodes: BoolArray, by: int) -> BoolArray:
@@ -79,16 +106,6 @@ def _pooled(
     for axis in (0, 1):
         field = convolve1d(field, (SUPPORT.coupling, 1.0, SUPPORT.coupling), axis=axis, mode="constant")
     return np.asarray(field.flat[chosen])
-
-
-def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same problem in no more data than it has unknowns, by QR: without the part of the data that none reaches."""
-    m, _, k = response.shape
-    if m <= 3 * k:
-        return response, data
-    both = np.column_stack((response.reshape(m, 3 * k), data))
-    upper = scipy.linalg.qr(both, mode="r", overwrite_a=True, check_finite=False)[0][: 3 * k]
-    return np.asarray(upper[:, :-1].reshape(3 * k, 3, k)), np.asarray(upper[:, -1])
 
 
 def node_relevance(response: FloatArray, data: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:

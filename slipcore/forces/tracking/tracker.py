@@ -81,7 +81,9 @@ class Tracker:
         """
         nodes, before = self.sensor.nodes, self.key.fit.support
         prior = choose_prior(observation, data, nodes, before, self.criterion, self.prior.smoothness)
-        support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), prior)
+        shape = prior.smoothness
+        support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), shape)
+        prior = choose_prior(observation, data, nodes, support.ravel(), self.criterion, shape, strength_alone=True)
         return self._on(observation, data, support, prior)
 
     def _on(

@@ -28,7 +28,7 @@ def test_what_is_small_beside_the_largest_keeps_its_digits() -> None:
     assert np.prod(np.diag(root)) ** 2 == pytest.approx(2e18 + 1e12 + 1.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("do", [covariance_root, Spectrum.of])
+@pytest.mark.parametrize("do", [covariance_root, lambda matrix: Spectrum.of(matrix, matrix[0])])
 def test_other_threads_go_on_meanwhile(do: Callable[[np.ndarray], object]) -> None:
     size, ticks = 300, 0
     while ticks < 10:  # where the interpreter is kept there are two at most, however much there is to do

@@ -20,5 +20,5 @@ REACHED = float(DATA @ DATA)
     ],
 )
 def test_each_criterion_has_its_optimum(criterion: Criterion, spread: float) -> None:
-    found = Spectrum(np.eye(2), np.full(2, SINGULAR)).choose(DATA, REST, COUNT, criterion)
+    found = Spectrum(np.full(2, SINGULAR), DATA).choose(REST, COUNT, criterion)
     assert found == pytest.approx(np.sqrt(spread - 1.0) / SINGULAR, rel=1e-4)

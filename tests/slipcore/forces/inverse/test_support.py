@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from scipy.linalg import hadamard
 
+from slipcore.contact.elasticity.grid import Grid
 from slipcore.forces.inverse.covariance import covariance_root
-from slipcore.forces.inverse.fit import ObservationModel
-from slipcore.forces.inverse.support import condensed, node_relevance, relevant_nodes, widened
+from slipcore.forces.inverse.fit import ObservationModel, condensed, log_evidence
+from slipcore.forces.inverse.prior import factors, usual
+from slipcore.forces.inverse.support import better_support, node_relevance, relevant_nodes, widened
+from slipcore.forces.operator.nodes import Nodes
 
 NODES = 16
 
@@ -66,3 +69,47 @@ def test_nodes_that_data_show_directly_are_found_with_the_row_beside_them(noise:
     data = np.concatenate([0.2 * loaded.ravel(), np.zeros(count), 0.7 * loaded.ravel()])
     found = relevant_nodes(ObservationModel(response, np.full(3 * count, noise)), data, np.ones(shape, dtype=bool))
     np.testing.assert_array_equal(found, widened(loaded, 1))
+
+
+LATTICE = Nodes(Grid((9, 8), (1e-3, 1e-3)))
+
+
+def directly_seen(loaded: np.ndarray, noise: float) -> tuple[ObservationModel, np.ndarray]:
+    """Every traction seen by itself with this noise: pressure of 0.4 where it is loaded, and no shear."""
+    count = loaded.size
+    data = np.concatenate([np.zeros(2 * count), 0.4 * loaded.ravel()])
+    data += noise * np.random.default_rng(5).standard_normal(3 * count)
+    return ObservationModel(np.eye(3 * count).reshape(3 * count, 3, count), np.full(3 * count, noise)), data
+
+
+def test_a_support_is_judged_by_the_strength_that_speaks_for_it_most() -> None:
+    """By the density of the data themselves: its maximum over strengths, but for what no support changes."""
+    observation, data = directly_seen(np.ones((9, 8), dtype=bool), 0.05)
+    support = np.zeros(72, dtype=bool)
+    support[10:14] = True
+    found, prior = log_evidence(observation, data, LATTICE, support, usual())
+    root = factors(LATTICE.places()[support], 1e-3, usual())
+
+    def density(strength: float) -> float:
+        value = 0.0
+        for axis, part in enumerate(root):
+            covariance = np.eye(4) + (strength / 0.05) ** 2 * part @ part.T
+            seen = data.reshape(3, -1)[axis, support] / 0.05
+            value += -0.5 * (seen @ np.linalg.solve(covariance, seen) + np.linalg.slogdet(covariance)[1])
+        return float(value + 0.5 * np.sum((data.reshape(3, -1)[:, support] / 0.05) ** 2))
+
+    assert found == pytest.approx(density(prior.strength), rel=1e-8)
+    assert found >= max(density(prior.strength * factor) for factor in (0.8, 0.95, 1.05, 1.25))
+
+
+@pytest.mark.parametrize("beside", [1, 2])
+def test_a_contact_that_is_cut_on_one_side_alone_is_found(beside: int) -> None:
+    """From a support that is too wide on one side, to which growing and shrinking on all sides does not lead."""
+    loaded = np.zeros((9, 8), dtype=bool)
+    loaded[2:6, 2:5] = True
+    observation, data = directly_seen(loaded, 0.02)
+    wide = loaded.copy()
+    wide[2:6, 5 : 5 + beside] = True
+    found = better_support(observation, data, LATTICE, wide, usual())
+    assert found[loaded].all()
+    assert (found & ~loaded).sum() <= 4 * (beside - 1) + 1
