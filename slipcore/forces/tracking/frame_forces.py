@@ -83,24 +83,25 @@ class Reader:
         """
         outward = np.array([1.0, 1.0, -1.0])
         traction = self.key.fit.traction(data)
-        of_elements, of_resultant = self._deviations(traction, data)
+        misfit = self._misfit(traction, data)
+        of_elements, of_resultant = self._deviations(traction, data, misfit)
         force = ((self.elements @ traction.T) * outward).reshape(*grid, 3)
         resultant = self.sensor.load * traction.sum(axis=1) * outward
-        deviation = np.hypot(of_elements.T.reshape(force.shape), RECONSTRUCTION.element_error * np.abs(force).max())
+        largest = RECONSTRUCTION.element_error * np.abs(force).max()
+        by_noise = np.hypot(misfit * self.deviation[2].reshape(grid), largest)
         covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * self.sensor.load
         return FrameForces(
             force,
-            deviation,
+            np.hypot(of_elements.T.reshape(force.shape), largest),
             resultant,
             np.hypot(of_resultant, RECONSTRUCTION.resultant_error * np.linalg.norm(resultant)),
-            _touching(-force[..., 2], deviation[..., 2]) & covered,
+            _touching(-force[..., 2], by_noise) & covered,
         )
 
-    def _deviations(self, traction: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _deviations(self, traction: FloatArray, data: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of elements' forces [3, e] N and of the resultant [3] N: by the data, by what bilinear
         tractions leave wrong, and by how much the bound on pulling changes what the data say.
         """
-        misfit = self._misfit(traction, data)
         bound = traction - (self.key.fit.operator @ data).reshape(traction.shape)
         unresolved, of_resultant = self.unresolved.deviations(traction)
         of_elements = np.zeros_like(self.deviation)
@@ -118,7 +119,9 @@ class Reader:
 
 
 def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:
-    """Elements [n, m] whose normal force is neither noise nor little beside others'."""
+    """Elements [n, m] whose normal force is neither noise of this ``deviation`` nor little beside others': what may lie
+    between nodes says where in the contact a force acts, not whether there is one.
+    """
     near = RECONSTRUCTION.rim_share * maximum_filter(normal, 3)
     least = np.maximum(near, RECONSTRUCTION.element_share * normal.max())
     return np.asarray(normal > np.maximum(RECONSTRUCTION.element_significance * deviation, least))

@@ -57,6 +57,13 @@ def test_in_the_plane_alone_the_contact_is_found_and_with_it_the_normal_force_on
     assert abs(found.contact[1].sum() / touching.sum() - 1.0) < 0.3
 
 
+def test_what_may_lie_between_nodes_does_not_hide_the_contact(pressed: Pressed) -> None:
+    log = pressed([2, 5, 7], axes=2)
+    found = reconstruct(log, GEL, noise=0.0)
+    touching = (truth(log)[..., 2] < 0.0).sum(axis=(1, 2))
+    np.testing.assert_allclose(found.contact.sum(axis=(1, 2)), touching, rtol=0.2)
+
+
 def test_what_is_only_the_priors_is_said(pressed: Pressed) -> None:
     """In the plane an incompressible half-space shows nothing of pressure; a given force is then all that is known."""
     log = pressed(LATE, noise=1e-6, axes=2, crop=INSIDE)
