@@ -311,8 +311,8 @@ def test_no_load_needs_no_force(make_model: Make) -> None:
     answer = required_normal_force(make_model(), 0.0, contact_area=AREA)
     assert answer.normal_force == 0.0
     assert answer.feasible_interval[1] > 0.0
-    hopeless = make_model((-0.1, 0.0, 0.0), ZERO)
-    assert required_normal_force(hopeless, 0.0, contact_area=AREA).feasible_interval == (0.0, 0.0)
+    for hopeless in (make_model((-0.1, 0.0, 0.0), ZERO), make_model((0.0, 0.0, 0.0), ZERO, scale=0.0)):
+        assert required_normal_force(hopeless, 0.0, contact_area=AREA).feasible_interval == (0.0, 0.0)
 
 
 def test_leaving_the_model_s_data_is_warned_of(make_model: Make) -> None:

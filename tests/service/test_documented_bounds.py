@@ -12,7 +12,7 @@ from service.processes import fair_queue, fair_threads
 from service.stream import broadcast, connection, detectors, sessions, sockets, watching
 
 DOCS = Path(__file__).parents[2] / "docs"
-WORDS = {1: "one", 2: "two", 3: "three", 4: "four"}
+WORDS = dict(enumerate(("one", "two", "three", "four", "five", "six", "seven", "eight", "nine"), 1))
 
 STATED = {
     "operations.md": (

@@ -396,3 +396,12 @@ def test_a_dropped_frame_hands_its_slip_on(plain: GraspLog) -> None:
 def test_impossible_effects_are_refused(make) -> None:
     with pytest.raises(InvalidInput):
         make()
+
+
+@pytest.mark.parametrize("force", [(0.0, 0.0), (1.0, 0.0), (0.0, -1.0), (1.0, 1.0)])
+def test_a_load_along_either_axis_is_there(force: tuple[float, float]) -> None:
+    load = TangentialLoad(force)
+    assert load.absent == (force == (0.0, 0.0))
+    assert len(load.extend(Scene("alone").plan()).histories) == len(Scene("alone").plan().histories) + sum(
+        map(bool, force)
+    )

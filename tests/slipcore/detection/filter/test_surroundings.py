@@ -79,3 +79,17 @@ def test_distances_are_eight_percent_too_far_at_most() -> None:
     assert (distance <= 1.083 * exact).all()
     assert distance_from(np.zeros_like(contact), np.zeros_like(contact), distance) == 0
     assert np.isinf(distance).all()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (6, 1), (5, 7)])
+def test_distances_are_those_of_the_shortest_way_by_steps_aslant_and_along(shape: tuple[int, int]) -> None:
+    """From any single element, whichever edge it lies at."""
+    rows, columns = np.indices(shape)
+    nothing, distance = np.zeros(shape, bool), np.empty(shape)
+    for place in np.ndindex(shape):
+        contact = nothing.copy()
+        contact[place] = True
+        along, across = abs(rows - place[0]), abs(columns - place[1])
+        shortest = np.maximum(along, across) + (np.sqrt(2.0) - 1.0) * np.minimum(along, across)
+        assert distance_from(nothing, contact, distance) == 1
+        np.testing.assert_allclose(distance, shortest, rtol=1e-12)

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from slipcore import detect_slip
 from slipcore.contact import tangential_ramp
@@ -12,6 +13,7 @@ from slipcore.detection.shared.contact import (
     ContactThreshold,
     curvature,
     find_contact,
+    neighbours,
     reach_rim,
     spatial_noise,
 )
@@ -132,3 +134,21 @@ def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
     impulse = np.zeros((9, 9))
     impulse[4, 4] = 1.0
     assert np.sqrt((curvature(impulse) ** 2).sum()) == pytest.approx(CURVATURE_NOISE, rel=2e-3)
+
+
+def test_an_element_touches_that_is_pressed_by_more_than_the_threshold() -> None:
+    """By exactly as much it does not, where the rim is not looked at; released it is under a share of that."""
+    touch = ContactThreshold(1e-3, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0)
+    pressing = np.array([[1e-3, np.nextafter(1e-3, 1.0)], [5e-4, np.nextafter(5e-4, 1.0)]])
+    for before, wanted in ((False, [[False, True], [False, False]]), (True, [[True, True], [False, True]])):
+        contact = np.zeros((2, 2), bool)
+        find_contact(pressing, 0.0, np.full((2, 2), before), touch, contact)
+        np.testing.assert_array_equal(contact, wanted)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (4, 6)])
+def test_neighbours_are_the_eight_around_an_element(shape: tuple[int, int]) -> None:
+    contact = np.random.default_rng(3).random(shape) < 0.6
+    around = ndimage.convolve(contact.astype(int), [[1, 1, 1], [1, 0, 1], [1, 1, 1]], mode="constant")
+    found = [[neighbours(contact, i, j) for j in range(shape[1])] for i in range(shape[0])]
+    np.testing.assert_array_equal(found, around)

@@ -7,7 +7,7 @@ import pytest
 
 from service.slip_benchmark.faults import Fault, correlated, rounded
 from slipcore import GraspLog, SlipHistory, detect_slip
-from slipcore.detection.shared.lasting_noise import noise_between_neighbours, seek_step
+from slipcore.detection.shared.lasting_noise import bend, noise_between_neighbours, seek_step, step_in_plane
 
 Scene = Callable[..., GraspLog]
 Score = Callable[[GraspLog, SlipHistory], float]
@@ -71,3 +71,23 @@ def test_white_noise_is_not_taken_to_last(scene: Scene) -> None:
             history = detect_slip(scene(name, marker_noise=size, force_noise=2e-3))
             assert history.findings == ()
             assert not size or history.noise == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_field_bends_by_what_no_line_and_no_column_has_alone(axis: int) -> None:
+    """x²y² by 4 everywhere, a sum of any functions of x and of y not at all."""
+    rng, x = np.random.default_rng(6), np.arange(7.0)
+    field = np.zeros((7, 7, 3))
+    field[..., axis] = np.multiply.outer(x**2, x**2)
+    alone = field.copy()
+    alone[..., axis] = rng.standard_normal((7, 1)) + rng.standard_normal(7)
+    for i, j in np.ndindex(5, 5):
+        assert bend(field, i + 1, j + 1, axis) == pytest.approx(4.0)
+        assert bend(alone, i + 1, j + 1, axis) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("of_places", "frames", "step"), [(2e-6, 0.0, 2e-6), (2e-6, 5.0, 2e-6), (0.0, 5.0, 0.0), (0.0, 0.0, 7e-6)]
+)
+def test_the_step_of_depth_counts_where_places_have_none_yet(of_places: float, frames: float, step: float) -> None:
+    assert step_in_plane(np.array([of_places, frames, 7e-6, 0.0])) == step
