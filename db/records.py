@@ -301,14 +301,15 @@ class SampleSummary:
 class SamplesOfLog:
     """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
 
-    ``findings``: names of what was found against the log; ``sensor``: its name; ``copies``: ids of later logs of the
+    ``findings``: names of what was found against the log, None where it was not looked for; ``sensor``: its name;
+    ``copies``: ids of later logs of the
     same grasp, which do not count.
     """
 
     grasp_log_id: str
     samples_blob: str
     moments: bytes | None
-    findings: tuple[str, ...] = ()
+    findings: tuple[str, ...] | None = ()
     sensor: str = ""
     copies: tuple[str, ...] = ()
 

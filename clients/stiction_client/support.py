@@ -27,7 +27,9 @@ ELEMENT_AREAS = "element_areas"
 """Diagnostic, a sentence: elements of the material's grasps differ in their area, and of which one forces are."""
 SAME_GRASPS = "same_grasps"
 """Diagnostic, a sentence: which of a material's logs are of a grasp that another log of it has, and do not count."""
-NOTES = (WEAKENING, SAME_GRASPS, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
+UNCHECKED = "unchecked_logs"
+"""Diagnostic, a sentence: how many of a material's logs an older version stored without looking for findings."""
+NOTES = (WEAKENING, SAME_GRASPS, UNCHECKED, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

@@ -112,7 +112,7 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
 
 
 def _samples_of_log(row: Row[Any], copies: tuple[str, ...] = ()) -> SamplesOfLog:
-    findings = tuple(finding["name"] for finding in row.findings or ())
+    findings = None if row.findings is None else tuple(finding["name"] for finding in row.findings)
     return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor, copies)
 
 

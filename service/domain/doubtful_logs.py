@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from slipcore.checks import AGAINST_FRICTION
+from stiction_client.support import UNCHECKED
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -19,3 +20,13 @@ def with_doubts(model: "FrictionModel", findings: Sequence[Collection[str]]) -> 
     logs = "log is" if len(doubts) == 1 else "logs is" if doubtful == 1 else "logs are"
     told = f"{doubtful} of {len(doubts)} {logs} doubtful ({', '.join(sorted(set().union(*doubts)))})"
     return replace(model, diagnostics={**model.diagnostics, "doubtful_logs": told})
+
+
+def with_unchecked(model: "FrictionModel", findings: Sequence[Collection[str] | None]) -> "FrictionModel":
+    """The model with a note among its diagnostics where an older version did not look for ``findings`` of some logs."""
+    unchecked = sum(each is None for each in findings)
+    if not unchecked:
+        return model
+    were = "log was" if len(findings) == 1 else "logs was" if unchecked == 1 else "logs were"
+    told = f"{unchecked} of {len(findings)} {were} stored before logs were checked: sent again, it is looked at"
+    return replace(model, diagnostics={**model.diagnostics, UNCHECKED: told})

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, NotFound, StorageUnavailable
-from db.records import Gel, NewGraspLog, StoredGraspLog
+from db.records import Detection, Gel, NewGraspLog, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, stores, uploads
 from db.repositories import sensors as stored_sensors
 from service import formats
@@ -244,19 +244,28 @@ def _change_sensor(
 def _can_go_on(session: Session, log: StoredGraspLog) -> bool:
     """Whether a job done again may take what it had found before it failed or was cancelled: it would find the same."""
     found = log.detection
-    return log.job.status in {"failed", "cancelled"} and found is not None and found.gel == _gel(session, log)
+    can_be_same = found is not None and not _is_unchecked(found) and found.gel == _gel(session, log)
+    return log.job.status in {"failed", "cancelled"} and can_be_same
 
 
 def _may_differ(session: Session, log: StoredGraspLog) -> bool:
-    """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, or the log's forces
-    follow from its sensor's gel, or would have, and that is described otherwise than when they were looked for.
+    """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, was done by a
+    version that did not look for all, or the log's forces follow from its sensor's gel, or would have, and that is
+    described otherwise than when they were looked for.
     """
     job, found = log.job, log.detection
     if job.status in {"failed", "cancelled"}:
         return True
+    if found is not None and _is_unchecked(found):
+        return job.finished_at is not None
     findings = () if found is None else found.findings or ()
     by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
     return by_gel and job.finished_at is not None and _gel(session, log) != (None if found is None else found.gel)
+
+
+def _is_unchecked(found: Detection) -> bool:
+    """Whether an older version did not look for findings, or whether the grasp is another log's."""
+    return found.findings is None or found.fingerprint is None
 
 
 def _gel(session: Session, log: StoredGraspLog) -> Gel | None:

@@ -26,7 +26,7 @@ from estimators.method_names import SCATTER_METHODS
 from service import formats
 from service.domain.calibrate import corrected
 from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import with_doubts
+from service.domain.doubtful_logs import with_doubts, with_unchecked
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
@@ -274,7 +274,9 @@ def _fit_by(
         data = [_moments(run, part) for part in parts]
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
-    return with_copies(with_doubts(model, [part.findings for part in parts]), parts)
+    findings = [part.findings for part in parts]
+    model = with_unchecked(with_doubts(model, [each or () for each in findings]), findings)
+    return with_copies(model, parts)
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:

@@ -15,7 +15,18 @@ from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.paging import Window
-from db.records import CalibrationPress, Claim, Detection, NewCalibration, NewGraspLog, NewModel, SampleSummary, Scales
+from db.records import (
+    CalibrationPress,
+    Claim,
+    Detection,
+    Finding,
+    NewCalibration,
+    NewGraspLog,
+    NewModel,
+    SampleSummary,
+    Scales,
+    StoredModel,
+)
 from db.repositories import (
     access_keys,
     audit,
@@ -34,6 +45,7 @@ from db.tables import Base, DetectionRow, GraspLogRow, MaterialOwnerRow, SensorR
 
 pytestmark = pytest.mark.usefixtures("real_migrations")
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+UNCHECKED = "unchecked_logs"
 REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
 
 
@@ -53,6 +65,12 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         browser_sessions.add(session, log.sha256, "0" * 12, now() + timedelta(hours=1))
         audit.add(session, audit.SERVICE, "material.created", "paper")
         assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
+
+
+def unmarked(stored: StoredModel) -> StoredModel:
+    """A model without the note that its logs were not checked: their findings are lost on the way back."""
+    diagnostics = {name: told for name, told in stored.model.diagnostics.items() if name != UNCHECKED}
+    return replace(stored, model=replace(stored.model, diagnostics=diagnostics))
 
 
 def tables(database: Database) -> set[str]:
@@ -169,7 +187,7 @@ def test_a_database_of_before_claims_keeps_its_jobs_and_models(
     migrate.check(database)
     with database.write() as session:
         assert sorted(job.status for job in jobs.list_all(session, Window("created_at"))) == ["failed", "queued"]
-        assert friction_models.versions(session, material, None) == models
+        assert [unmarked(each) for each in friction_models.versions(session, material, None)] == models
         stored = detections.samples_of_material(session, material)
         assert [found.moments for found in stored] == [None]
         detections.set_moments(session, stored[0].grasp_log_id, b"moments")
@@ -196,10 +214,37 @@ def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell
     migrate.downgrade(database, "0014", lose=True)
     migrate.upgrade(database)
     with database.read() as session:
-        hierarchical, ols = friction_models.versions(session, 1)
+        hierarchical, ols = map(unmarked, friction_models.versions(session, 1))
     assert hierarchical.model == structured
     assert ols.model == new_model()
     assert ols.model.scales is None
+
+
+def test_models_of_logs_that_were_not_checked_say_so(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+) -> None:
+    """By an older version's models they had counted as sound."""
+    with database.write() as session:
+        kinds: dict[str, list[tuple[Finding, ...] | None]] = {"old": [None, (), None], "new": [()]}
+        for name, found in kinds.items():
+            material = materials.create(session, name, "").id
+            for findings in found:
+                log_id = grasp_logs.add(session, new_log(material))
+                job = jobs.add(session, "ingest", "ols", material_id=material, grasp_log_id=log_id)
+                detections.add(session, log_id, replace(detection, findings=findings), samples)
+            grasp_logs.withdraw(session, log_id, "wet") if name == "old" else None
+            friction_models.add(session, material, job, new_model())
+    migrate.downgrade(database, "0025")
+    migrate.upgrade(database)
+    with database.read() as session:
+        told = {stored.material: stored.model for stored in friction_models.with_ids(session, [1, 2])}
+    note = "1 of 2 logs was stored before logs were checked: sent again, it is looked at"
+    noted = replace(new_model(), diagnostics={**new_model().diagnostics, UNCHECKED: note})
+    assert told == {"new": new_model(), "old": noted}
 
 
 def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
@@ -217,7 +262,7 @@ def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
     migrate.downgrade(database, "0017", lose=True)
     migrate.upgrade(database)
     with database.read() as session:
-        assert friction_models.versions(session, 1) == models
+        assert [unmarked(each) for each in friction_models.versions(session, 1)] == models
         found = session.execute(text("SELECT j.kind, m.method FROM friction_models m JOIN jobs j ON j.id = m.job_id"))
         assert set(found.all()) == {("ingest", "ols"), ("fit", "hierarchical")}
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel
-from service.domain.doubtful_logs import with_doubts
+from service.domain.doubtful_logs import with_doubts, with_unchecked
+from stiction_client.support import notes
 
 MODEL = FrictionModel(
     method="ols",
@@ -40,3 +41,13 @@ def test_findings_against_friction_are_counted_and_named(findings: list[list[str
 def test_findings_that_less_was_seen_speak_not_against_friction() -> None:
     assert with_doubts(MODEL, [["no rest", "slow frames", "repeated frames", "no displacement"], []]) is MODEL
     assert MODEL.support == "supported"
+
+
+@pytest.mark.parametrize(
+    ("findings", "told"),
+    [([None], "1 of 1 log was"), ([None, ()], "1 of 2 logs was"), ([None, None, ["saturation"]], "2 of 3 logs were")],
+)
+def test_logs_that_were_not_checked_are_counted(findings: list[list[str] | None], told: str) -> None:
+    (note,) = notes(with_unchecked(MODEL, findings).diagnostics)
+    assert note == f"{told} stored before logs were checked: sent again, it is looked at"
+    assert with_unchecked(MODEL, [["saturation"], ()]) is MODEL

@@ -17,7 +17,7 @@ from db.database import Database
 from db.errors import ClaimLost
 from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, StoredGraspLog, StoredModel
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners, sensors
-from db.tables import JobRow, SampleSummaryRow
+from db.tables import DetectionRow, JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments, ScatterPrior
 from service.domain.collect_friction import collect
 from service.domain.look_up import FrictionQuery, look_up
@@ -192,6 +192,16 @@ def test_a_grasp_that_was_sent_in_several_files_counts_once(shop: Shop, content:
         assert found is not None
         assert found.findings is not None
         assert found.findings[0].name == "same grasp"
+
+
+def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes) -> None:
+    shop.run(shop.ingest(content)[1])
+    with shop.database.write() as session:
+        session.execute(update(DetectionRow).values(findings=None))
+    shop.run(shop.ingest(another_grasp(content))[1])
+    stored = hierarchical_model(shop)
+    assert to_client_model(stored).notes == (stored.model.diagnostics["unchecked_logs"],)
+    assert str(stored.model.diagnostics["unchecked_logs"]).startswith("1 of 2 logs was stored before ")
 
 
 def test_a_log_that_lowers_what_may_be_counted_on_is_named(

@@ -14,7 +14,7 @@ from benchmarks.calibration.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import Gel, NewCalibration
-from db.repositories import calibrations, detections, jobs, materials, runners, sensors
+from db.repositories import calibrations, detections, grasp_logs, jobs, materials, runners, sensors
 from db.tables import DetectionRow, JobRow
 from service.domain.calibrate import OFFSET, corrected
 from service.domain.reconstruct import RECONSTRUCTED
@@ -291,6 +291,26 @@ def test_a_log_is_looked_at_again_whatever_the_trail_holds_and_the_clocks_say(
     assert send(**asked).json()["job"]["status"] == "queued"
     run_next(database, blobs)
     assert send(**asked).json()["job"]["status"] != "queued"
+
+
+@pytest.mark.parametrize("missing", ["findings", "fingerprint"])
+def test_a_log_of_before_the_checks_is_looked_at_once_it_is_sent_again(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, content: bytes, missing: str
+) -> None:
+    """It had counted as sound for ever."""
+    send = lab_that_sends(reach, content)
+    reach("open").request("POST", "/v1/materials", json={"name": "paper"})
+    log_id = send(material="paper").json()["id"]
+    run_next(database, blobs)
+    with database.write() as session:
+        session.execute(update(DetectionRow).values({missing: None}))
+    assert send(material="paper").json()["job"]["status"] == "queued"
+    run_next(database, blobs)
+    with database.read() as session:
+        found = grasp_logs.get(session, log_id).detection
+    assert found is not None
+    assert None not in (found.findings, found.fingerprint)
+    assert send(material="paper").json()["job"]["status"] == "done"
 
 
 def test_who_names_no_sensor_is_told_to_name_one(
