@@ -32,6 +32,7 @@ WHOLE_TABLES = {
 
 ENTRIES = {
     "SampleOptions": ("force_noise", "estimated unless it is given"),
+    "slipcore.contact.ACCURACY": ("cost_order more_ahead", "not measured yet"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),
 }
 """Entries of other tables that are not on it."""

@@ -13,7 +13,7 @@ from slipcore.contact.solver.kernels import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
 from slipcore.contact.tiers.difference import Difference as Difference
 from slipcore.contact.tiers.difference import difference as difference
-from slipcore.contact.tiers.extrapolation import USUAL, grid_error, on_finer, orders
+from slipcore.contact.tiers.extrapolation import grid_error, on_finer
 from slipcore.contact.tiers.requests import OutOfTime, Runs
 from slipcore.contact.tiers.sampling import frame_times
 from slipcore.errors import InvalidInput
@@ -94,9 +94,11 @@ class _AccuracySearch:
         reach = contact_reach(plan)
         self.plan, self.target, self.every = _sampled(plan, reach), target, every
         self.limited = bool(np.isfinite(budget))
+        self.shows_steps = len(frame_times(self.plan)) >= ACCURACY.fewest_frames
+        self.rarely = _half_the_frames(self.plan)
         self.runs = Runs(PROBE.room * reach, budget, progress, strict=not every)
-        guess = ACCURACY.coarsest_cells * (ACCURACY.coarsest_error / target if target > 0.0 else 1.0)
-        self.runs.expect(self.plan, (*self.least(), self.at(_even(min(guess, ACCURACY.finest_cells)), 1)))
+        coarsest, second = self.least()
+        self.runs.expect(self.plan, (coarsest, *self.ahead(second, ACCURACY.coarsest_cells, None)))
 
     def at(self, cells: int, substeps: int) -> Fidelity:
         """A fidelity, at the solver's tolerance that the target asks for."""
@@ -107,6 +109,17 @@ class _AccuracySearch:
         """The runs without which there is no estimate, beside one in longer steps."""
         cells = ACCURACY.coarsest_cells
         return self.at(cells, 1), self.at(_even(cells * ACCURACY.least_growth), 1)
+
+    def ahead(self, following: Fidelity, cells: int, grid: Difference | None) -> tuple[Fidelity, ...]:
+        """The runs to come, by the error of a grid with so many cells (None: not known yet): the next one, and the
+        last where that is not.
+        """
+        if self.target == 0.0:
+            return (following,)
+        error = ACCURACY.coarsest_error if grid is None else grid.largest
+        growth = max(error / ((1.0 - ACCURACY.step_share) * self.target), 1.0)
+        enough = _even(min(growth * cells, ACCURACY.finest_cells))
+        return (following, replace(following, cells=enough)) if enough > following.cells else (following,)
 
     def price(self, cells: int, substeps: int) -> float:
         """Seconds that a run should take."""
@@ -119,47 +132,59 @@ class _AccuracySearch:
         grid: Difference | None = None
         while (following := self.following(made[-1][0], substeps, grid, steps)) is not None:
             fidelity = self.at(*following)
-            self.runs.expect(self.plan, (fidelity,))
+            self.runs.expect(self.plan, self.ahead(fidelity, made[-1][0], grid))
             made.append((fidelity.cells, self.runs.run(self.plan, fidelity)))
-            grid, order = _grid_error(made)
+            grid = _grid_error(made)
             steps, substeps = steps.times(substeps / fidelity.substeps), fidelity.substeps
             yield Refined(made[-1][1], fidelity, grid.plus(steps), self.runs.spent)
-            self.refuse_the_unreachable(fidelity, grid, steps, order)
-            if not self.limited and steps.largest > ACCURACY.step_share * self.target:
-                coarsest, substeps, steps = self.more_steps(substeps, steps)
-                made = [(ACCURACY.coarsest_cells, coarsest)]
+            self.refuse_the_unreachable(fidelity, grid, steps)
+            if self.limited:
+                steps = self.measured_again(made[-1][1], fidelity, grid, steps)
+            elif grid.largest <= (1.0 - ACCURACY.step_share) * self.target:
+                yield from self.shorter_steps(made, fidelity, grid)
 
     def coarsest(self) -> tuple[GraspLog, Difference]:
-        """A log on the coarsest grid at a load step a frame, and what these steps leave.
-
-        That falls in proportion to their length at least: steps of two frames, or of half a one where frames are few,
-        show it.
-        """
-        one, sampling = self.least()[0], self.plan.sampling
-        assert sampling is not None  # of ``_sampled``
-        if len(frame_times(self.plan)) < ACCURACY.fewest_frames:
+        """A log on the coarsest grid at a load step a frame, and what these steps leave."""
+        one = self.least()[0]
+        if not self.shows_steps:
             log = self.runs.run(self.plan, one)
             self.refuse_the_too_short()
-            return log, difference(log, self.runs.run(self.plan, replace(one, substeps=2))).times(2.0)
-        rarely = replace(self.plan, sampling=replace(sampling, frame_rate=0.5 * sampling.frame_rate))
-        longer = self.runs.run(rarely, one)
+            return log, _left_by(log, self.runs.run(self.plan, replace(one, substeps=2)))
+        longer = self.runs.run(self.rarely, one)
         self.refuse_the_too_short()
         log = self.runs.run(self.plan, one)
-        return log, difference(longer, log.take(slice(0, 2 * len(longer) - 1, 2)))
+        return log, _left_by_half(longer, log)
 
-    def more_steps(self, substeps: int, steps: Difference) -> tuple[GraspLog, int, Difference]:
-        """A log on the coarsest grid in enough load steps a frame, their number, and what they leave."""
-        log = self.runs.run(self.plan, self.at(ACCURACY.coarsest_cells, substeps))
-        while True:
-            finer = self.runs.run(self.plan, self.at(ACCURACY.coarsest_cells, 2 * substeps))
-            before, steps, log, substeps = steps, difference(log, finer), finer, 2 * substeps
-            allowed = ACCURACY.step_share * self.target
-            if steps.largest <= allowed:
-                return log, substeps, steps
-            falls = float(np.log2(max(before.largest / steps.largest, 1.0)))
-            reached = steps.largest * (substeps / ACCURACY.most_substeps) ** falls
+    def measured_again(self, log: GraspLog, fidelity: Fidelity, grid: Difference, steps: Difference) -> Difference:
+        """What the steps of a log leave, measured on its own grid where that matters and takes a small part of what is
+        left of the budget: on a coarse grid a front moves by a whole cell, or not at all.
+        """
+        if not self.shows_steps or steps.largest <= ACCURACY.step_share * grid.largest:
+            return steps
+        if self.runs.price(self.rarely, fidelity) > ACCURACY.scouting_share * self.runs.left:
+            return steps
+        return _left_by_half(self.runs.run(self.rarely, fidelity), log)
+
+    def shorter_steps(
+        self, made: list[tuple[int, GraspLog]], fidelity: Fidelity, grid: Difference
+    ) -> Iterator[Refined]:
+        """The last of some logs, whose grid is fine enough, with what its steps leave on the grid before and on its
+        own; then in ever shorter steps, until these are short enough, too.
+        """
+        allowed, log = ACCURACY.step_share * self.target, made[-1][1]
+        steps = Difference(np.inf, np.inf, np.inf)
+        for cells, own in made[1:][-2:] if self.shows_steps else ():
+            steps = _left_by_half(self.runs.run(self.rarely, replace(fidelity, cells=cells)), own)
+            yield Refined(log, fidelity, grid.plus(steps), self.runs.spent)
+        while steps.largest > allowed:
+            shorter = replace(fidelity, substeps=2 * fidelity.substeps)
+            self.runs.expect(self.plan, (shorter,))
+            finer = self.runs.run(self.plan, shorter)
+            steps, log, fidelity = _left_by(log, finer).times(0.5), finer, shorter
+            yield Refined(log, fidelity, grid.plus(steps), self.runs.spent)
+            reached = steps.times((fidelity.substeps / ACCURACY.most_substeps) ** ACCURACY.step_order).largest
             if reached > allowed:
-                takes = self.price(ACCURACY.finest_cells, ACCURACY.most_substeps)
+                takes = self.price(fidelity.cells, ACCURACY.most_substeps)
                 raise OutOfReach("accuracy", self.target, reached / ACCURACY.step_share, takes)
 
     def following(
@@ -173,7 +198,7 @@ class _AccuracySearch:
             fits = grid is None or self.price(finer, substeps) <= self.runs.left
             return (finer, substeps) if fits else None
         if self.target > 0.0:
-            finer = _enough_cells(cells, grid, self.target - steps.largest)
+            finer = _enough_cells(cells, grid, self.target - min(steps.largest, ACCURACY.step_share * self.target))
             if self.price(finer, substeps) <= self.runs.left:
                 return finer, substeps
         return self.affordable(cells, substeps, grid, steps)
@@ -234,28 +259,37 @@ class _AccuracySearch:
         least = max(known, ACCURACY.runs_at_least * seconds)
         return OutOfReach("seconds", self.runs.budget, least, least)
 
-    def refuse_the_unreachable(
-        self, fidelity: Fidelity, grid: Difference, steps: Difference, order: Difference
-    ) -> None:
+    def refuse_the_unreachable(self, fidelity: Fidelity, grid: Difference, steps: Difference) -> None:
         """Raise ``OutOfReach`` where neither the finest grid nor the most load steps would meet the target."""
         if self.limited or self.target == 0.0 or grid.plus(steps).largest <= self.target:
             return
         left = steps.times((fidelity.substeps / ACCURACY.most_substeps) ** ACCURACY.step_order)
-        reached = on_finer(grid, max(ACCURACY.finest_cells / fidelity.cells, 1.0), order).plus(left).largest
+        reached = on_finer(grid, max(ACCURACY.finest_cells / fidelity.cells, 1.0)).plus(left).largest
         if reached > self.target:
             raise OutOfReach("accuracy", self.target, reached, self.price(ACCURACY.finest_cells, fidelity.substeps))
 
 
-def _grid_error(made: list[tuple[int, GraspLog]]) -> tuple[Difference, Difference]:
-    """What the last of some grids leaves, by their cells and logs, and the orders in the cell size that it goes by."""
+def _grid_error(made: list[tuple[int, GraspLog]]) -> Difference:
+    """What the last of some grids leaves, by their cells and logs: from the next two that are coarser by enough."""
     cells, finest = made[-1]
     coarser = [entry for entry in made[:-1] if cells >= ACCURACY.least_growth * entry[0]]
-    change, growth = difference(coarser[-1][1], finest), cells / coarser[-1][0]
-    if len(coarser) < 2:
-        return grid_error(change, growth), USUAL
-    (first, coarsest), (second, coarse) = coarser[-2:]
-    order = orders(difference(coarsest, coarse), change, (first, second, cells))
-    return grid_error(change, growth, order), order
+    return grid_error([(cells / count, difference(log, finest)) for count, log in coarser[-2:]])
+
+
+def _half_the_frames(plan: Plan) -> Plan:
+    """The plan with every other frame, and load steps of two."""
+    assert plan.sampling is not None  # of ``_sampled``
+    return replace(plan, sampling=replace(plan.sampling, frame_rate=0.5 * plan.sampling.frame_rate))
+
+
+def _left_by_half(longer: GraspLog, log: GraspLog) -> Difference:
+    """What the load steps of a log leave, by one of half the frames: it falls in proportion to them at least."""
+    return difference(longer, log.take(slice(0, 2 * len(longer) - 1, 2)))
+
+
+def _left_by(log: GraspLog, shorter: GraspLog) -> Difference:
+    """What the load steps of a log leave, by one in half of them."""
+    return difference(log, shorter).times(2.0)
 
 
 def _enough_cells(cells: int, grid: Difference | None, allowed: float) -> int:

@@ -55,7 +55,8 @@ class Fidelity:
 
 
 def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = no_progress) -> GraspLog:
-    """Simulate a plan; the log has no observation effects yet. ``progress`` is called after each frame.
+    """Simulate a plan; the log has no observation effects yet. ``progress`` is called after each load step, with the
+    part of them that is done.
 
     Raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
     """
@@ -95,17 +96,18 @@ def _frames(
     progress: Progress,
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
-    state, growth = solver.start(), step_growth(fidelity)
+    growth = step_growth(fidelity)
+    steps = [load_steps(plan, begin, end, fidelity.substeps, growth) for begin, end in pairwise(times)]
+    state, count = solver.start(), sum(len(instants) - 1 for instants in steps)
     frames, warnings = [untouched(where)], list[tuple[str, ...]]()
-    for begin, end in pairwise(times):
-        instants = load_steps(plan, begin, end, fidelity.substeps, growth)
+    for instants in steps:
         results: list[StepResult] = []
         for before, now in pairwise(instants):
             state, result = solver.step(state, plan.load(float(before), float(now)))
             results.append(result)
-        warnings += [result.warnings() for result in results]
+            warnings.append(result.warnings())
+            progress(len(warnings) / count)
         frames.append(frame_record(where, results))
-        progress(len(frames) / len(times))
     return frames, warnings
 
 

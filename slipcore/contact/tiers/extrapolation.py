@@ -1,5 +1,6 @@
 """The error of a log, from logs of the same scene on coarser grids."""
 
+from collections.abc import Sequence
 from dataclasses import astuple
 
 import numpy as np
@@ -8,36 +9,25 @@ from slipcore.contact.defaults import ACCURACY
 from slipcore.contact.tiers.difference import Difference
 
 USUAL = Difference(ACCURACY.usual_ratio_order, ACCURACY.usual_order, ACCURACY.usual_order)
-"""Powers of the cell size with which the errors fall, where two grids are all there is."""
+"""Powers of the cell size with which the errors fall: those of each scene, by three grids, scatter more."""
 
 
-def orders(before: Difference, change: Difference, cells: tuple[int, int, int]) -> Difference:
-    """Powers of the cell size that explain the changes between three grids: ``before`` that from the first to the
-    second, ``change`` from there to the third, ``cells`` across each; within what is seen of fine grids.
+def grid_error(changes: Sequence[tuple[float, Difference]]) -> Difference:
+    """What a grid leaves, with a margin, by its differences from coarser ones and the factors by which it has more
+    cells across; the mean of what each of them says.
     """
-    found = (_order(*pair, cells) for pair in zip(astuple(before), astuple(change), strict=True))
-    return Difference(*found)
+    told = [astuple(_by_one(growth, change)) for growth, change in changes]
+    return Difference(*(float(part) for part in np.mean(told, axis=0)))
 
 
-def _order(before: float, change: float, cells: tuple[int, int, int]) -> float:
-    low, high = ACCURACY.least_order, ACCURACY.largest_order
-    if change <= 0.0 or before <= 0.0:
-        return low
-    tried = np.linspace(low, high, ACCURACY.tried_orders)
-    first, second, third = (float(count) ** -tried for count in cells)
-    ratio = (first - second) / (second - third)  # rises with the order
-    return float(np.interp(before / change, ratio, tried))
-
-
-def grid_error(change: Difference, growth: float, order: Difference = USUAL) -> Difference:
-    """What the finer of two grids leaves, whose cells are ``growth`` apart, with a margin."""
+def _by_one(growth: float, change: Difference) -> Difference:
     parts = (
         ACCURACY.safety * part / (growth**power - 1.0)
-        for part, power in zip(astuple(change), astuple(order), strict=True)
+        for part, power in zip(astuple(change), astuple(USUAL), strict=True)
     )
     return Difference(*parts)
 
 
-def on_finer(error: Difference, growth: float, order: Difference = USUAL) -> Difference:
+def on_finer(error: Difference, growth: float) -> Difference:
     """What is left of a grid's error with ``growth`` times the cells."""
-    return Difference(*(part * growth**-power for part, power in zip(astuple(error), astuple(order), strict=True)))
+    return Difference(*(part * growth**-power for part, power in zip(astuple(error), astuple(USUAL), strict=True)))

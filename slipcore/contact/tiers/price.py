@@ -21,7 +21,12 @@ class Size:
 
     def work(self, overhead: float) -> float:
         """In steps on one cell, each step with as much beside its cells as ``overhead`` of them cost."""
-        return self.steps * (overhead + self.cells)
+        return self.steps * (_load(overhead) + _load(self.cells))
+
+
+def _load(cells: float) -> float:
+    """What cells cost in a step: more than in proportion, since transforms do, and iterations."""
+    return float(cells**ACCURACY.cost_order)
 
 
 class Sizes:
@@ -60,11 +65,12 @@ class Pace:
         if large[0].cells < ACCURACY.telling_growth * small[0].cells:
             return usual
         first, last = (seconds / size.steps for size, seconds in (small, large))
-        slope = (last - first) / (large[0].cells - small[0].cells)
+        slope = (last - first) / (_load(large[0].cells) - _load(small[0].cells))
         spread = ACCURACY.overhead_spread
         if slope <= 0.0:
             return usual * spread
-        return min(max(last / slope - large[0].cells, usual / spread), usual * spread)
+        beside = float(max(last / slope - _load(large[0].cells), 0.0) ** (1.0 / ACCURACY.cost_order))
+        return min(max(beside, usual / spread), usual * spread)
 
     def seconds(self, size: Size) -> float:
         """What a run should take; 0 before the first."""

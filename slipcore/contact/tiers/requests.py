@@ -64,6 +64,7 @@ class Runs:
         log = run(plan, fidelity, heard)
         self._pace.learn(size, self.spent - began)
         self._done += _work(size)
+        self._ahead -= _work(size)
         return log
 
     def _size(self, plan: Plan, fidelity: Fidelity) -> Size:
@@ -76,7 +77,7 @@ class Runs:
 
     def _tell(self, now: float, whole: float) -> None:
         """Report which part of the work, or of the budget, is done: never less than before."""
-        part = (self._done + now) / (self._done + max(whole, self._ahead))
+        part = (self._done + now) / (self._done + ACCURACY.more_ahead * max(whole, self._ahead))
         if np.isfinite(self.budget):
             part = self.spent / self.budget
         self._reported = min(max(self._reported, part), 1.0)

@@ -7,8 +7,19 @@ import numpy as np
 import pytest
 
 from benchmarks.contact import random_requests
-from benchmarks.contact.random_requests import RandomRequest, TooLong, request, requests, scene_of, table, until
-from slipcore.contact.errors import OutOfReach
+from benchmarks.contact.random_requests import (
+    BudgetRequest,
+    RandomRequest,
+    TooLong,
+    budget_request,
+    budget_table,
+    request,
+    requests,
+    scene_of,
+    table,
+    until,
+)
+from slipcore.contact.errors import InfeasibleLoad, OutOfReach
 
 ANSWERED = RandomRequest(0, ("FiniteLayer",), "answered", 0.1, 0.04, 0.02, 1.0)
 
@@ -55,3 +66,15 @@ def test_refused_and_long_scenes_are_counted_as_such(monkeypatch: pytest.MonkeyP
 
 def test_every_eighth_scene_is_held_for_longer() -> None:
     assert [scene_of(seed).duration for seed in range(6, 9)] == [2.0, 8.0, 2.0]
+
+
+def test_budgets_are_counted_by_what_of_them_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = [BudgetRequest(seed, 4.0, used, 0.02) for seed, used in enumerate((3.0, 3.6, 4.0, 4.7, 4.9, 0.0))]
+    assert budget_table(made).splitlines()[2] == "| 6 | 1 | 3 | 1 | 1 | 0.75 | 1.00 | 1.23 | 0.020 |"
+    assert len(budget_table([]).splitlines()) == 2
+    for error, expected in (
+        (OutOfReach("seconds", 4.0, 9.0, 9.0), BudgetRequest(0, 4.0, 0.0, 0.0)),
+        (InfeasibleLoad(np.zeros(3), 0.5), None),
+    ):
+        monkeypatch.setattr(random_requests, "simulate_to", lambda *_, error=error, **__: (_ for _ in ()).throw(error))
+        assert budget_request(0, 4.0) == expected

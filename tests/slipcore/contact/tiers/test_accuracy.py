@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from slipcore.contact.defaults import ACCURACY
-from slipcore.contact.effects import LoadPath, SensorSampling, TangentialLoad, Torsion
+from slipcore.contact.effects import LoadPath, NormalTangentialCoupling, SensorSampling, TangentialLoad, Torsion
 from slipcore.contact.errors import Interrupted, NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
@@ -19,7 +19,7 @@ from slipcore.contact.scene import Press, Scene, simulate
 from slipcore.contact.tiers import accuracy, requests
 from slipcore.contact.tiers.accuracy import Difference, _AccuracySearch, difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
-from slipcore.contact.tiers.price import Sizes
+from slipcore.contact.tiers.price import Pace, Size, Sizes
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -41,7 +41,7 @@ def test_the_solver_is_a_share_as_wrong_as_what_is_asked(target: float, toleranc
     assert _AccuracySearch.at(search, 20, 1).tolerance == pytest.approx(tolerance, rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "accuracies"), [("shear", (0.1, 0.03)), ("twist", (0.05,)), ("reversal", (0.05,))])
+@pytest.mark.parametrize(("name", "accuracies"), [("shear", (0.1, 0.015)), ("twist", (0.05,)), ("reversal", (0.05,))])
 def test_the_true_error_is_within_what_was_asked_and_more_takes_a_finer_grid(
     name: str, accuracies: tuple[float, ...]
 ) -> None:
@@ -151,6 +151,86 @@ def test_an_accuracy_out_of_reach_is_refused_after_the_coarsest_runs(
     assert max(fidelity.cells for fidelity in clock.runs) <= 20
     assert {fidelity.substeps for fidelity in clock.runs} == {1}
     assert str(pickle.loads(pickle.dumps(refused.value))) == str(refused.value)
+
+
+@pytest.mark.parametrize(("target", "name"), [(0.05, "shear"), (0.02, "shear"), (0.03, "twist"), (0.02, "reversal")])
+def test_the_time_left_is_known_to_a_factor_of_five(monkeypatch: pytest.MonkeyPatch, target: float, name: str) -> None:
+    clock, told = Clock(monkeypatch, name), list[tuple[float, float]]()
+    simulate_to(SCENES[name].plan(), accuracy=target, progress=lambda part: told.append((clock.now, part)))
+    until_half = [(now, part) for now, part in told if now <= 0.5 * clock.now]
+    assert until_half
+    for now, part in until_half:
+        left = now * (1.0 / part - 1.0)
+        assert 0.2 <= left / (clock.now - now) <= 5.0
+    assert all(part < 1.0 for now, part in told if now < clock.now)
+
+
+def test_progress_of_a_run_is_the_share_of_its_load_steps() -> None:
+    """A coupled press takes many in a frame, and runs are ended by how far they are after a while."""
+    scene, told = Scene("pressed", (NormalTangentialCoupling(), SensorSampling((8, 8), 1e-3, 2.0))), list[float]()
+    log = run(scene.plan(), Fidelity(8, 1, 1e-3, aligned=False), told.append)
+    assert len(told) == int(log.metadata["steps"]) > 2 * len(log)
+    assert told == pytest.approx(np.arange(1, len(told) + 1) / len(told))
+
+
+class Fronts(Clock):
+    """Logs whose stick ratio differs by ``on_grid``/cells, by ``flips``/cells² in steps of other than a frame, as where
+    a front goes by one cell more or less, and by ``in_steps``·(length of a step, frames)² in all.
+    """
+
+    on_grid, flips, in_steps = 0.0, 0.0, 0.0
+
+    def run(self, plan: Plan, fidelity: Fidelity, progress: Progress = no_progress) -> GraspLog:
+        log = super().run(plan, fidelity, progress)
+        assert plan.sampling is not None
+        assert log.truth is not None
+        length = SENSOR.frame_rate / plan.sampling.frame_rate / fidelity.substeps
+        error = self.on_grid / fidelity.cells + self.in_steps * length**2
+        error += self.flips / fidelity.cells**2 * (length != 1.0)
+        return replace(log, truth=replace(log.truth, stick_ratio=np.full(len(log), 0.5 + error)))
+
+
+def test_steps_are_measured_anew_on_a_fine_grid_where_a_coarse_one_shows_flips(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of one cell on the front: on twelve across a ring of eight is a tenth of a contact's area."""
+    clock = Fronts(monkeypatch)
+    clock.on_grid, clock.flips = 0.5, 14.0
+    found = simulate_to(SCENES["shear"].plan(), accuracy=0.03)
+    assert found.fidelity.substeps == 1
+    assert 0.5 / found.fidelity.cells <= found.error.largest <= 0.03
+    assert found.fidelity.cells <= 60
+
+
+@pytest.mark.parametrize("rate", [SENSOR.frame_rate, 3.0])
+def test_a_log_whose_steps_are_too_long_is_made_in_shorter_ones(monkeypatch: pytest.MonkeyPatch, rate: float) -> None:
+    """Of many frames, and of so few that half of them show nothing."""
+    plan = replace(SCENES["shear"].plan(), sampling=replace(SCENES["shear"].plan().sampling, frame_rate=rate))
+    clock = Fronts(monkeypatch)
+    clock.on_grid, clock.in_steps = 0.1, 0.08 * (rate / SENSOR.frame_rate) ** 2
+    found = simulate_to(plan, accuracy=0.03)
+    assert found.fidelity.substeps > 1
+    true = 0.1 / found.fidelity.cells + 0.08 / found.fidelity.substeps**2
+    assert 0.5 * true <= found.error.largest <= 0.03
+
+
+def test_a_budget_measures_steps_anew_where_they_seem_to_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the grid between the first and the last: with half of the frames, too."""
+    clock = Fronts(monkeypatch)
+    clock.on_grid, clock.flips = 0.1, 14.0
+    simulate_to(SCENES["shear"].plan(), seconds=1.0)
+    between = clock.runs[2]
+    assert ACCURACY.coarsest_cells < between.cells < clock.runs[-1].cells
+    assert clock.runs.count(between) == 2
+
+
+def test_prices_of_larger_grids_follow_from_smaller_ones() -> None:
+    """Steps of 2 ms, and of 1 µs a cell, as much longer with the cells as scenes of the library have it."""
+    pace = Pace()
+    for cells in (40**2, 80**2):
+        pace.learn(Size(20, cells), 20 * (2e-3 + 3e-7 * cells**ACCURACY.cost_order))
+    expected = 50 * (2e-3 + 3e-7 * 40_000**ACCURACY.cost_order)
+    assert pace.seconds(Size(50, 40_000)) == pytest.approx(expected, rel=0.02)
 
 
 def test_progress_is_told_from_the_first_run_and_never_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
