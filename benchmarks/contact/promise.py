@@ -6,8 +6,9 @@ Writes contact_promise.json (each case as soon as it is known; what is there alr
 contact_promise.png, and prints a Markdown table. The whole takes half an hour.
 
 `--requests N` asks N random scenes over all effects instead, against runs on twice the cells (random_requests.json,
-kept and gone on with likewise): how often the estimate lies within a factor of three of the true error. `--first 10000`
-takes seeds that are there for choosing defaults.
+kept and gone on with likewise): how often the estimate lies within a factor of three of the true error. `--budgets N`
+asks N of them for the best log in `--budget` seconds: how much of that is used. `--first 10000` takes seeds that are
+there for choosing defaults.
 """
 
 import argparse
@@ -140,6 +141,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--requests", type=int, default=0, help="ask so many random scenes instead")
+    parser.add_argument("--budgets", type=int, default=0, help="ask so many random scenes for the best in --budget")
+    parser.add_argument("--budget", type=float, default=4.0, help="seconds of each of these")
     parser.add_argument("--first", type=int, default=0, help=f"seed; from {random_requests.TUNING} on for tuning")
     parser.add_argument("--cap", type=float, default=60.0, help="processor seconds a random scene")
     parser.add_argument("--seconds", type=float, default=np.inf, help="processor seconds of all random scenes")
@@ -148,6 +151,11 @@ def main() -> None:
     if options.requests > 0:
         seeds, path = range(options.first, options.first + options.requests), options.output / "random_requests.json"
         print(random_requests.table(random_requests.requests(path, seeds, options.cap, options.seconds)))
+        return
+    if options.budgets > 0:
+        seeds = range(options.first, options.first + options.budgets)
+        made = (random_requests.budget_request(seed, options.budget) for seed in seeds)
+        print(random_requests.budget_table([entry for entry in made if entry is not None]))
         return
     promises = campaign(options.output / "contact_promise.json")
     picture(promises).savefig(options.output / "contact_promise.png", dpi=100)

@@ -28,6 +28,8 @@ LONG, LONGER = 8, 8.0
 """Every so many scenes one lasts so many seconds."""
 FACTOR = 3.0
 """Of the true error that an estimate should lie within."""
+KEPT = 0.2
+"""Part of a budget by which its use may differ from it."""
 KINDS = ("NormalTangentialCoupling", "FiniteLayer", "Viscoelasticity", "VelocityFriction", "long")
 
 
@@ -108,6 +110,45 @@ def requests(path: Path, seeds: Iterable[int], cap: float, seconds: float = np.i
         path.write_text(json.dumps([asdict(entry) for entry in known], indent=1))
         print(known[-1], flush=True)
     return [entry for entry in known if entry.seed in set(wanted)]
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRequest:
+    """A request for the best log within so many seconds: it ``used`` so many (0 where it was refused), and estimated
+    its error.
+    """
+
+    seed: int
+    seconds: float
+    used: float
+    estimated: float
+
+
+def budget_request(seed: int, seconds: float) -> BudgetRequest | None:
+    """Ask one scene; None where friction does not carry its load."""
+    try:
+        found = simulate_to(scene_of(seed).plan(seed), seconds=seconds)
+    except OutOfReach:
+        return BudgetRequest(seed, seconds, 0.0, 0.0)
+    except InfeasibleLoad:
+        return None
+    return BudgetRequest(seed, seconds, found.seconds, found.error.largest)
+
+
+def budget_table(made: list[BudgetRequest]) -> str:
+    """How much of their budgets requests used, by the clock."""
+    parts = np.array([entry.used / entry.seconds for entry in made if entry.used > 0.0])
+    low, high = ((parts < 1.0 - KEPT).sum(), (parts > 1.0 + KEPT).sum())
+    lines = ["| requests | refused | used within 20 % | less | more | least | median | most | median estimate |"]
+    lines.append("|---|---|---|---|---|---|---|---|---|")
+    if parts.size == 0:
+        return "\n".join(lines)
+    estimated = np.median([entry.estimated for entry in made if entry.used > 0.0])
+    lines.append(
+        f"| {len(made)} | {len(made) - parts.size} | {parts.size - low - high} | {low} | {high} | {parts.min():.2f} "
+        f"| {np.median(parts):.2f} | {parts.max():.2f} | {estimated:.3f} |"
+    )
+    return "\n".join(lines)
 
 
 def table(made: list[RandomRequest]) -> str:
