@@ -1,7 +1,8 @@
 """Random requests over all effects of mechanics, for `benchmarks.contact_promise --requests N`: is the estimate right?
 
-The truth is a run on twice the cells, in twice the load steps a frame, of what a request came to. It errs by itself, at
-first order by half as much: a true error is known to about that.
+The truth is a run in twice the load steps a frame on twice the cells of what a request came to, on four times as many
+where these are no more than 100 across. It errs by itself, on twice the cells at first order by half as much: a true
+error is known to about that.
 """
 
 import json
@@ -28,6 +29,8 @@ LONG, LONGER = 8, 8.0
 """Every so many scenes one lasts so many seconds."""
 FACTOR = 3.0
 """Of the true error that an estimate should lie within."""
+FINER, FINEST, TRUTH_CELLS = 2, 4, 100
+"""Times the cells of an answer that its truth has, at least and at most, and cells up to which it has more."""
 KEPT = 0.2
 """Part of a budget by which its use may differ from it."""
 KINDS = ("NormalTangentialCoupling", "FiniteLayer", "Viscoelasticity", "VelocityFriction", "long")
@@ -94,7 +97,8 @@ def request(seed: int, cap: float) -> RandomRequest:
 
 def true_error(plan: Plan, found: Refined, progress: Progress) -> float:
     """Of the log of a request, whose points a scene without a sensor has of its own."""
-    finer = replace(found.fidelity, cells=2 * found.fidelity.cells, substeps=2 * found.fidelity.substeps)
+    cells, substeps = found.fidelity.cells, found.fidelity.substeps
+    finer = replace(found.fidelity, cells=max(FINER * cells, min(FINEST * cells, TRUTH_CELLS)), substeps=2 * substeps)
     return difference(found.log, run(plan, finer, progress)).largest
 
 

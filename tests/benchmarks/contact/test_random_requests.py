@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -17,9 +18,14 @@ from benchmarks.contact.random_requests import (
     requests,
     scene_of,
     table,
+    true_error,
     until,
 )
 from slipcore.contact.errors import InfeasibleLoad, OutOfReach
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.tiers.accuracy import Difference, Refined
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.frames import GraspLog
 
 ANSWERED = RandomRequest(0, ("FiniteLayer",), "answered", 0.1, 0.04, 0.02, 1.0)
 
@@ -62,6 +68,18 @@ def test_refused_and_long_scenes_are_counted_as_such(monkeypatch: pytest.MonkeyP
     assert request(0, 0.0).became == "too long"
     with pytest.raises(TooLong):
         until(-np.inf)(0.5)
+
+
+@pytest.mark.parametrize(("cells", "finer"), [(20, 80), (34, 100), (50, 100), (94, 188)])
+def test_the_truth_is_on_a_finer_grid_in_half_the_steps(
+    monkeypatch: pytest.MonkeyPatch, cells: int, finer: int
+) -> None:
+    ran: list[Fidelity] = []
+    monkeypatch.setattr(random_requests, "run", lambda _, fidelity, __: ran.append(fidelity))
+    monkeypatch.setattr(random_requests, "difference", lambda *_: Difference(0.1, 0.2, 0.0))
+    found = Refined(cast("GraspLog", None), Fidelity(cells, 2, 1e-3), Difference(0.1, 0.1, 0.1), 1.0)
+    assert true_error(cast("Plan", None), found, lambda _: None) == 0.2
+    assert ran == [Fidelity(finer, 4, 1e-3)]
 
 
 def test_every_eighth_scene_is_held_for_longer() -> None:
