@@ -14,8 +14,6 @@ from slipcore.frames import FloatArray
 _dgebrd = CFUNCTYPE(None, *[c_void_p] * 11)(lapack_address("dgebrd"))
 _dormbr = CFUNCTYPE(None, *[c_void_p] * 14)(lapack_address("dormbr"))
 _dbdsqr = CFUNCTYPE(None, *[c_void_p] * 15)(lapack_address("dbdsqr"))
-BLOCK = 64
-"""Columns that LAPACK takes at a time, at most."""
 
 
 def singular_components(matrix: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -29,7 +27,8 @@ def singular_components(matrix: FloatArray, data: FloatArray) -> tuple[FloatArra
     m, p = left.shape
     r = min(m, p)
     values, beside, of_left, of_right = (np.zeros(max(r, 1)) for _ in range(4))
-    work, info = np.empty(max(BLOCK * (m + p), 4 * r)), c_int()
+    block = 64  # columns that LAPACK takes at a time, at most
+    work, info = np.empty(max(block * (m + p), 4 * r)), c_int()
     rows, columns, count, one, none, length = (byref(c_int(size)) for size in (m, p, r, 1, 0, len(work)))
     a, d, e, c, space = (array.ctypes.data for array in (left, values, beside, turned, work))
     tau, done = of_left.ctypes.data, byref(info)
