@@ -52,4 +52,4 @@ def _note_unchecked_logs(connection: sa.Connection) -> None:
 
 def _sentence(unchecked: int, logs: int) -> str:
     were = "log was" if logs == 1 else "logs was" if unchecked == 1 else "logs were"
-    return f"{unchecked} of {logs} {were} stored before logs were checked: sent again, it is looked at"
+    return f"{unchecked} of {logs} {were} stored before logs were checked: what is sent again is looked at"

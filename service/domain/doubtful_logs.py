@@ -28,5 +28,5 @@ def with_unchecked(model: "FrictionModel", findings: Sequence[Collection[str] | 
     if not unchecked:
         return model
     were = "log was" if len(findings) == 1 else "logs was" if unchecked == 1 else "logs were"
-    told = f"{unchecked} of {len(findings)} {were} stored before logs were checked: sent again, it is looked at"
+    told = f"{unchecked} of {len(findings)} {were} stored before logs were checked: what is sent again is looked at"
     return replace(model, diagnostics={**model.diagnostics, UNCHECKED: told})

@@ -242,7 +242,7 @@ def test_models_of_logs_that_were_not_checked_say_so(
     migrate.upgrade(database)
     with database.read() as session:
         told = {stored.material: stored.model for stored in friction_models.with_ids(session, [1, 2])}
-    note = "1 of 2 logs was stored before logs were checked: sent again, it is looked at"
+    note = "1 of 2 logs was stored before logs were checked: what is sent again is looked at"
     noted = replace(new_model(), diagnostics={**new_model().diagnostics, UNCHECKED: note})
     assert told == {"new": new_model(), "old": noted}
 

@@ -49,5 +49,5 @@ def test_findings_that_less_was_seen_speak_not_against_friction() -> None:
 )
 def test_logs_that_were_not_checked_are_counted(findings: list[list[str] | None], told: str) -> None:
     (note,) = notes(with_unchecked(MODEL, findings).diagnostics)
-    assert note == f"{told} stored before logs were checked: sent again, it is looked at"
+    assert note == f"{told} stored before logs were checked: what is sent again is looked at"
     assert with_unchecked(MODEL, [["saturation"], ()]) is MODEL
