@@ -591,7 +591,7 @@ class SampleOptions(Options):
     """Least tangential velocity over its noise, √2 σ_marker over the interval."""
     least_force_share: Annotated[float, Option(0.0, 0.99, "-", "the rim, where forces are least certain")] = 0.1
     """Least normal force as a share of the frame's largest."""
-    force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "bias of 1/f_n is (σ/f_n)²: 0.25 %")] = 20.0
+    force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "tuning grasps; bias of 1/f_n by (σ/f_n)⁴: 0.2 %")] = 5.0
     """Least normal force over its noise: μ = f_t/f_n is heavy-tailed and biased below."""
     force_noise: Annotated[float, Option(0.0, 1e3, "N", "NaN: estimated from the log")] = math.nan
     """Standard deviation of an element's normal force."""

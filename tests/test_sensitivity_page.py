@@ -31,6 +31,7 @@ WHOLE_TABLES = {
 """Tables of which no entry is on the page. What is measured leaves this list, and that below."""
 
 ENTRIES = {
+    "slipcore.forces.RECONSTRUCTION": ("force_to_noise", "of friction samples, which presses do not give"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.contact.ACCURACY": ("cost_order more_ahead", "not measured yet"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),

@@ -39,8 +39,8 @@ class InspectedLog:
         """Friction samples, with the noise of reconstructed forces."""
         from slipcore import collect_samples
 
-        noise = {} if self.reconstruction is None else {"force_noise": self.reconstruction.force_noise}
-        return collect_samples(self.log, self.history, **noise)
+        options = {} if self.reconstruction is None else self.reconstruction.of_samples
+        return collect_samples(self.log, self.history, **options)
 
     def findings(self) -> "list[Finding]":
         """What makes friction from it doubtful."""

@@ -6,7 +6,6 @@ import numpy as np
 
 import slipcore
 from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipHistory
-from slipcore.defaults import SampleOptions
 
 if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
@@ -22,7 +21,7 @@ def collect(
         return _no_samples(log), _without_forces(log)
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
-    options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
+    options = {} if reconstruction is None else reconstruction.of_samples
     found = slipcore.collect_friction(log, history, **options)
     if len(found.samples) == 0:
         because = found.elements_left_out or _unsure(log, reconstruction) or _without_samples(log, history)
@@ -35,7 +34,7 @@ def _unsure(log: GraspLog, reconstruction: "Reconstruction | None") -> str | Non
     if reconstruction is None or log.force is None:
         return None
     largest, noise = float(-log.force[..., 2].min()), reconstruction.force_noise
-    if largest >= SampleOptions().force_to_noise * noise:
+    if largest >= reconstruction.of_samples["force_to_noise"] * noise:
         return None
     return (
         f"elements' normal forces follow from displacement to ± {1e3 * noise:.2g} mN of at most "

@@ -147,6 +147,8 @@ class ReconstructionDefaults(Options):
     of it."""
     element_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 1e-2
     """The same of an element's force, as a share of the largest."""
+    force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "neighbours err together, and by no mean less")] = 20.0
+    """Least normal force of an element's friction sample over its deviation: more than of a sensor's own forces."""
     force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
     least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9

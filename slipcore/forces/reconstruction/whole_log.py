@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
+from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.strength import Criterion
 from slipcore.forces.operator.gel import Gel
@@ -66,6 +67,11 @@ class Reconstruction:
         """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
         touching = self.deviation[..., 2][self.contact]
         return float(np.median(touching)) if touching.size else 0.0
+
+    @property
+    def of_samples(self) -> dict[str, float]:
+        """Options of friction samples by these forces."""
+        return {"force_noise": self.force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
 
 
 def reconstruct(
