@@ -69,6 +69,8 @@ class NoiseDefaults(Options):
     """By so much a place may miss a multiple of the step in which places are given."""
     finest_step: Annotated[float, Option(0.0, 1e-3, "m", "a third of it is less than any camera's noise")] = 2e-8
     """No finer one is distinguished from none."""
+    field_bend: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes: 0.003 around the rim of a cup")] = 0.004
+    """How much of its size a field of displacement may bend by without noise."""
     lasting_told: Annotated[
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6

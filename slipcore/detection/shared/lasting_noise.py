@@ -11,7 +11,7 @@ from slipcore.noise import ranked, recent_median, remember
 
 SERIES = NOISE.series
 _MEMORY, _LEAST, _LEVELS, _INNER = NOISE.memory, NOISE.least_step, NOISE.step_levels, NOISE.least_inner
-_FINEST = NOISE.finest_step
+_FINEST, _BEND = NOISE.finest_step, NOISE.field_bend
 SPREAD, STEP = 9, 10
 """Rows of a memory's noise, behind those of ``observe.step_noise``: a ring of estimates, and the step, m."""
 ROWS = 11
@@ -46,7 +46,8 @@ def step_lasting(
 @compiled
 def noise_between_neighbours(displacement: FloatArray, values: FloatArray) -> float:
     """Standard deviation of a coordinate in the plane by how displacement [n, m, 3] bends both along and across,
-    in m: the lower quartile over evenly chosen elements, most of which lie where the field is even. NaN where there are
+    in m: the lower quartile over evenly chosen elements, most of which lie where the field is even, without what a
+    field of that size may bend by itself. NaN where there are
     fewer than ``NOISE.least_inner`` that have neighbours. ``values``: room for twice as many.
     """
     n, m, _ = displacement.shape
@@ -57,7 +58,24 @@ def noise_between_neighbours(displacement: FloatArray, values: FloatArray) -> fl
         i, j = divmod(s * inner // SERIES, m - 2)
         for a in range(2):
             values[2 * s + a] = abs(bend(displacement, i + 1, j + 1, a)) / OF_STENCIL
-    return ranked(values[: 2 * SERIES], SERIES // 2) / OF_QUARTILE
+    found, of_field = ranked(values[: 2 * SERIES], SERIES // 2) / OF_QUARTILE, _BEND * size_of(displacement)
+    return math.sqrt(max(found * found - of_field * of_field, 0.0))
+
+
+@compiled
+def size_of(displacement: FloatArray) -> float:
+    """Root mean square of a component of displacement [n, m, 3] about its mean, m; of evenly chosen elements."""
+    n, m, _ = displacement.shape
+    count, total = min(n * m, SERIES), 0.0
+    for a in range(3):
+        first = second = 0.0
+        for s in range(count):
+            i, j = divmod(s * n * m // count, m)
+            value = displacement[i, j, a]
+            first += value
+            second += value * value
+        total += max(second - first * first / count, 0.0)
+    return math.sqrt(total / (3 * count))
 
 
 @compiled
