@@ -117,6 +117,14 @@ class NumericsDefaults(Options):
     """Of the moment of a contact's forces."""
     stretch_variance: Annotated[float, Option(0.0, 1e-4, "-", "rounding of a fit of many points")] = 1e-14
     """Allowed beside what linear theory of a rotation makes."""
+    agreement_seen: Annotated[float, Option(1.0, 1e6, "-", "ten standard deviations")] = 100.0
+    """Squared depth over its noise from which forces are compared with displacement."""
+    agreement_clear: Annotated[float, Option(0.0, 1e6, "-", "weighs half at two standard deviations")] = 5.0
+    """Squared force over its noise at which half of its misfit counts."""
+    agreement_rest: Annotated[float, Option(0.0, 1.0, "-", "a hundredth of the depth")] = 1e-4
+    """Squared depth over its largest at which forces are compared from anew."""
+    trusted: Annotated[float, Option(0.0, 1.0, "-", "as likely wrong as right")] = 0.5
+    """Trust in forces from which on they are used at all."""
     yaw_variance: Annotated[float, Option(0.0, 1e-4, "rad²", "rounding of a fit of many points")] = 1e-16
     """The same of a given pose's yaw."""
 
@@ -313,6 +321,10 @@ class FilterOptions(ContactOptions):
     """Such noise that is none."""
     lasting_share: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; errors of frames are not independent")] = 2.0
     """Factor on its variance; 0: no noise is taken to last."""
+    pooling_length: Annotated[float, Option(0.0, 1.0, "m", "tuning scenes: 3 to 10 µm differ by 0.01")] = 6e-6
+    """So much neighbours part in slip: the more lasting noise exceeds it, the more a place is taken from theirs."""
+    pooling_outlier: Annotated[float, Option(0.1, 1e6, "-", "tuning scenes")] = 4.4
+    """Squared difference over its variance at which a neighbour's weight falls to a quarter."""
     marker_kernel: Annotated[float, Option(0.0, 0.1, "m", "0: not smoothed; of whole logs estimated")] = 0.0
     """Standard deviation of the kernel that the sensor smooths displacement with, which is then undone."""
     force_kernel: Annotated[float, Option(0.0, 0.1, "m", "0: not smoothed; of whole logs estimated")] = 0.0
@@ -427,6 +439,26 @@ class FilterOptions(ContactOptions):
     """Least rate of the normal force over its noise."""
     stiffness_ratio: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67
     """Tangential over normal stiffness of a stuck contact."""
+    stiffness_spread: Annotated[float, Option(1e-3, 10.0, "-", "half-space to thin bonded gel")] = 0.5
+    """How far it may lie from that, before forces and displacement show it."""
+    agreement_fast: Annotated[float, Option(0.0, 10.0, "s", "a few frames against shake")] = 0.1
+    """Time constant of the low-pass on sums of forces and of displacement, and of how far they part."""
+    agreement_slow: Annotated[float, Option(0.0, 100.0, "s", "tuning scenes")] = 0.4
+    """The same of what their changes are counted from."""
+    agreement_memory: Annotated[float, Option(1e-3, 1e6, "s", "a grasp")] = 5.0
+    """Time constant of what is learnt of their proportion."""
+    agreement_error: Annotated[float, Option(0.0, 1.0, "-", "0.003 to 0.005 on elastic tuning scenes")] = 0.005
+    """What they may part by anyway, as a share of the largest normal force."""
+    agreement_misfit: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes; a creeping gel parts by 0.04")] = 0.15
+    """Misfit of forces, as a share of them, at which half of the trust is left."""
+    contact_doubted: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.05
+    """Trust in forces below which contact is found from the shape."""
+    contact_trusted: Annotated[float, Option(0.0, 1.0, "-", "not to and fro")] = 0.9
+    """Trust from which on it is found from forces again."""
+    lean_spread: Annotated[float, Option(1e-6, 10.0, "-", "normals that err by 6°")] = 0.1
+    """Crosstalk of the normal force along the surface before any is seen."""
+    lean_least: Annotated[float, Option(0.0, 10.0, "-", "normals that err by 3°")] = 0.05
+    """So much of it is let be."""
     least_transition: Annotated[float, Option(1e-15, 0.1, "-", "numerics")] = 1e-06
     """Least probability of slip and of stick that is predicted."""
     largest_log_odds: Annotated[

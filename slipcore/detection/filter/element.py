@@ -32,8 +32,8 @@ class Increment(NamedTuple):
 
 class Measurement(NamedTuple):
     """What a step brings to an element: how far the object carried it, m, and the variance of that, m²; how much more
-    readily it begins to slip than ``onset_length`` says; log-odds of slip from its forces; and where
-    its marker is in the object's frame, m.
+    readily it begins to slip than ``onset_length`` says; log-odds of slip from its forces; where its marker is in the
+    object's frame, m, and what share of a marker's variance that has.
     """
 
     motion_x: float
@@ -43,6 +43,7 @@ class Measurement(NamedTuple):
     force_log_odds: float
     x: float
     y: float
+    share: float
 
 
 class PlaceEstimate(NamedTuple):
@@ -75,7 +76,9 @@ def update_element(
     slid = PlaceEstimate(
         slid.x - tuning.slip_share * seen.motion_x, slid.y - tuning.slip_share * seen.motion_y, slid.variance
     )
-    noise = increment.variance + seen.motion_variance + (tuning.rigidity_of_fit * tuning.rigidity) ** 2 * size2
+    noise = (
+        seen.share * increment.variance + seen.motion_variance + (tuning.rigidity_of_fit * tuning.rigidity) ** 2 * size2
+    )
     stick2 = (seen.x - stuck.x) ** 2 + (seen.y - stuck.y) ** 2
     slip2 = (seen.x - slid.x) ** 2 + (seen.y - slid.y) ** 2
     stick_variance, slip_variance = stuck.variance + noise, slid.variance + noise

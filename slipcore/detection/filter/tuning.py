@@ -18,6 +18,8 @@ class Tuning(NamedTuple):
     lasting_ratio: float
     lasting_least: float
     lasting_share: float
+    pooling_length: float
+    pooling_outlier: float
     rigidity: float
     rigidity_of_fit: float
     rigidity_of_anchor: float
@@ -69,6 +71,16 @@ class Tuning(NamedTuple):
     pressing_deviations: float
     pressing_force_deviations: float
     stiffness_ratio: float
+    stiffness_spread: float
+    agreement_fast: float
+    agreement_slow: float
+    agreement_memory: float
+    agreement_error: float
+    agreement_misfit: float
+    contact_doubted: float
+    contact_trusted: float
+    lean_spread: float
+    lean_least: float
     least_transition: float
     largest_log_odds: float
     threshold: float

@@ -118,7 +118,8 @@ class Workspace(NamedTuple):
     An array that is allocated for a frame costs more than what is done to it where elements are few, and the counting
     of references to all others in the same function as much again: numba only leaves that out where it frees nothing.
     ``weight`` [n, m]: how surely each element sticks before and after. ``series`` [2, k]: values to take medians of.
-    Of the elements that a method looks at one by one: their ``places`` [n·m, 2] and ``rows`` [17, n·m] of numbers.
+    Of the elements that a method looks at one by one: their ``places`` [n·m, 2] and ``rows`` [17, n·m] of numbers, and
+    how far their markers are from their anchors, ``offsets`` [2, n, m] m.
     """
 
     surface: Surface
@@ -127,6 +128,7 @@ class Workspace(NamedTuple):
     series: FloatArray
     places: NDArray[np.int64]
     rows: FloatArray
+    offsets: FloatArray
 
 
 @compiled
@@ -136,7 +138,13 @@ def workspace(n: int, m: int) -> Workspace:
     surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), stays, np.empty(4))
     decision, series = Decision(slip, np.empty(shape)), np.empty((2, _SERIES))
     return Workspace(
-        surface, decision, np.empty(shape), series, np.empty((n * m, 2), np.int64), np.empty((_ROWS, n * m))
+        surface,
+        decision,
+        np.empty(shape),
+        series,
+        np.empty((n * m, 2), np.int64),
+        np.empty((_ROWS, n * m)),
+        np.empty((2, n, m)),
     )
 
 

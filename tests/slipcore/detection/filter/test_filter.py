@@ -92,7 +92,7 @@ def updated(p: float, motion: float, share: float, restick: bool) -> float:
     old, new = np.zeros((state.ROWS, 1, 1)), np.zeros((state.ROWS, 1, 1))
     old[state.PROBABILITY] = p
     old[state.STICK_VARIANCE] = old[state.SLIP_VARIANCE] = 1e-12
-    seen = Measurement(motion, 0.0, 0.0, 0.04 if restick else 2.0, 0.0, -share * motion, 0.0)
+    seen = Measurement(motion, 0.0, 0.0, 0.04 if restick else 2.0, 0.0, -share * motion, 0.0, 1.0)
     update_element(old, new, 0, 0, seen, Increment(1.0 / 30.0, 1e-12, restick, False), TUNING)
     return float(new[state.PROBABILITY, 0, 0])
 
