@@ -1,6 +1,5 @@
 """What every method reports of its data and of what it found, in one form."""
 
-import math
 import time
 from collections.abc import Sequence
 
@@ -50,11 +49,11 @@ def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
 def element_areas(samples: GraspData) -> Diagnostics:
     """Of grasps whose elements differ in their area: in a sentence, of which element the model's forces are."""
     parts = samples if isinstance(samples, Sequence) else [samples]
-    least, most = (choose(part.element_area for part in parts) for choose in (min, max))
-    if math.isclose(most, least, rel_tol=1e-6):  # rounding of lattices
+    least, most = (f"{1e6 * choose(part.element_area for part in parts):.3g}" for choose in (min, max))
+    if least == most:
         return {}
-    told = f"its grasps are by elements of {1e6 * least:.3g} to {1e6 * most:.3g} mm²"
-    return {ELEMENT_AREAS: f"{told}: normal forces are those of one of {1e6 * least:.3g} mm², unless its area is given"}
+    told = f"its grasps are by elements of {least} to {most} mm²"
+    return {ELEMENT_AREAS: f"{told}: normal forces are those of one of {least} mm², unless its area is given"}
 
 
 def sensor_gain(nodes: ScaleNodes) -> Diagnostics:
