@@ -1,7 +1,8 @@
 """The mathematics of ``μ = β₀ + β₁ v + β₂ f_n + ε``: one home for whoever has fitted it and whoever plans with it."""
 
+import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""
-SENSORS_NAMED = 4
-"""At most, to who asks for one that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +260,7 @@ class LinearFriction:
         if self.scales is None or known is None:
             return self
         if name not in known.sensors:
-            return self._of_unknown_sensor(name, sorted(known.sensors))
+            return self._of_unknown_sensor(name, known.sensors)
         sensor = known.sensors[name]
         return replace(  # type: ignore[type-var]  # every model is a record
             self,
@@ -291,9 +290,9 @@ class LinearFriction:
             element_area=area,
         )
 
-    def _of_unknown_sensor(self, name: str, known: Sequence[str]) -> Self:
-        few = ", ".join(map(repr, known[:SENSORS_NAMED])) + (", …" if len(known) > SENSORS_NAMED else "")
-        told = f"no grasp of it is by a sensor {name!r} ({few} are known): the answer allows for the gain of any sensor"
+    def _of_unknown_sensor(self, name: str, known: Iterable[str]) -> Self:
+        near = "".join(f" (did you mean {each!r}?)" for each in difflib.get_close_matches(name, known, n=1))
+        told = f"no grasp of it is by a sensor {name!r}{near}: the answer allows for the gain of any sensor"
         return replace(self, diagnostics={**self.diagnostics, UNKNOWN_SENSOR: told})  # type: ignore[type-var]
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:

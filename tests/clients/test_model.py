@@ -95,9 +95,8 @@ def test_a_known_sensor_has_its_own_law_and_another_may_have_any(make_model: Mak
     assert model.predict(0.0, 0.1, 0.01) < alone.predict(0.0, 0.1, 0.01)
     right = model.of_sensor("right")
     assert (right.scales, right.coefficients.tolist()) == (model.scales, model.coefficients.tolist())
-    assert right.notes == (
-        "no grasp of it is by a sensor 'right' ('left' are known): the answer allows for the gain of any sensor",
-    )
+    assert right.notes == ("no grasp of it is by a sensor 'right': the answer allows for the gain of any sensor",)
+    assert "'lefft' (did you mean 'left'?)" in model.of_sensor("lefft").notes[0]
     left = model.of_sensor("left")
     assert left.predict(0.0, 0.1) == pytest.approx(0.49)
     assert (left.scales, left.degrees_of_freedom, left.scale) == (SCALES, 9.0, 0.03)
