@@ -75,6 +75,10 @@ class NoiseDefaults(Options):
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
     """Noise that lasts from frame to frame from which a finding reports it; less may be the field's own bends."""
+    doubt_told: Annotated[
+        float, Option(0.0, 1.0, "-", "sound ramps: up to 0.13, while stiffness is learnt at touch")
+    ] = 0.25
+    """Share of the frames in contact, in which forces do not go with displacement, from which a finding reports it."""
     step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3
     """Different places from which they may be multiples of a step."""
 

@@ -77,7 +77,7 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
 def disagreements(common: FloatArray) -> list[Finding]:
     """Forces that do not follow displacement, and normal forces that appear along the surface."""
     found, frames, doubted = [], round(common[FORCE_FRAMES]), round(common[DOUBTED_FRAMES])
-    if doubted:
+    if doubted > NOISE.doubt_told * frames:
         evidence = f"forces do not go with displacement in {doubted} of {frames} frames; slip is found without them"
         remedy = "look for forces that are late, stand still, drift, or change their gain"
         found.append(Finding("forces not believed", evidence, remedy))
