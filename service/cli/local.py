@@ -125,22 +125,28 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service.domain.doubtful_logs import with_doubts
+    from service.domain.same_grasp import fingerprint, same_grasp
 
-    def found(path: Path) -> "tuple[FrictionSamples, list[Finding]]":
-        seen = look(read_log(path, mapping), detector, sensor_model, gel)
-        return seen.samples(), seen.findings()
+    def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
+        log = read_log(path, mapping)
+        seen = look(log, detector, sensor_model, gel)
+        return fingerprint(log), seen.samples(), seen.findings()
 
-    seen = list(counted(map(found, logs), len(logs), "logs looked at"))
-    for path, (_, findings) in zip(logs, seen, strict=True):
-        for finding in findings:
+    first = dict[str, Path]()
+    seen: list[tuple[FrictionSamples, list[Finding]]] = []
+    looked_at = list(counted(map(found, logs), len(logs), "logs looked at"))
+    for path, (grasp, samples, findings) in zip(logs, looked_at, strict=True):
+        for finding in (*same_grasp([first[grasp].name] if grasp in first else []), *findings):
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
+        if first.setdefault(grasp, path) is path:
+            seen.append((samples, findings))
     with shown_progress(f"fitting by {method}"):
         model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
     model = with_doubts(model, [[finding.name for finding in findings] for _, findings in seen])
     if json:
         print_json(model_record(model))
     else:
-        print_model(model, f"{method} fit of {model.n} samples from {len(logs)} grasp(s)")
+        print_model(model, f"{method} fit of {model.n} samples from {len(seen)} grasp(s)")
 
 
 def convert(

@@ -253,6 +253,15 @@ def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: l
     assert "β₁ [s/m]" in out
 
 
+def test_fit_counts_a_grasp_once_that_comes_in_two_files(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    log, copy = formats.read(ramps[0]), tmp_path / "copy.npz"
+    container.write(replace(log, time=log.time + 10.0, sensor="other", truth=None), copy)
+    _, alone, _ = run("fit", *ramps[:2], "--method", "ols", "--json")
+    code, out, told = run("fit", *ramps[:2], copy, "--method", "ols", "--json")
+    assert (code, json.loads(out)["n"]) == (0, json.loads(alone)["n"])
+    assert f"copy.npz: same grasp: the measurements are those of log {ramps[0].name}" in told
+
+
 def test_fit_says_that_velocities_are_unknown(run: Run, ramps: list[Path], tmp_path: Path) -> None:
     path = tmp_path / "unposed.npz"
     container.write(replace(formats.read(ramps[-1]), object_pose=None), path)
