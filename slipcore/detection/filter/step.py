@@ -135,7 +135,8 @@ def step_elements(
         take_over(before, after, surface.stays)
     increment = Increment(interval, variance, restick, held)
     find_offsets(anchors, pose, places, room.offsets)
-    beside = 0.0 if told_step > 0.0 else lasting * lasting / (lasting * lasting + tuning.pooling_length**2)
+    # Neighbours blur where slip begins; only what no force shows is worth that.
+    beside = 0.0 if told_step > 0.0 or has_force else lasting * lasting / (lasting * lasting + tuning.pooling_length**2)
     scale = 4.0 * tuning.pooling_outlier * variance
     for e in range(len(places)):
         i, j = places[e]

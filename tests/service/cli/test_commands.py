@@ -144,7 +144,7 @@ def test_check_says_what_is_doubtful_and_fit_says_it_beside_its_model(
 
 
 def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp_path: Path) -> None:
-    dots = Path(__file__).parent / "formats" / "tracked_dots.csv"
+    dots = Path(__file__).parents[1] / "formats" / "tracked_dots.csv"
     code, out, _ = run("detect", dots, "--method", "filter", "--json", "--picture", tmp_path / "slip.png")
     seen = json.loads(out)
     assert (code, seen["frames"], "unknown" in seen) == (0, 31, False)
@@ -868,7 +868,7 @@ def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(
 def test_forces_do_not_follow_from_what_tells_no_displacement_in_metres(
     run: Run, felt: Path, gel: Path, tmp_path: Path
 ) -> None:
-    told = (Path(__file__).parent / "formats" / "tracked_dots.csv").read_text(encoding="utf-8")
+    told = (Path(__file__).parents[1] / "formats" / "tracked_dots.csv").read_text(encoding="utf-8")
     (tmp_path / "dots.csv").write_text(told.replace("# scale", "# was"), encoding="utf-8")
     code, _, err = run("detect", tmp_path / "dots.csv", "--gel", gel)
     assert (code, "the log's scale is unknown" in err) == (INPUT_REFUSED, True), err
