@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import estimators
 import slipcore
 import stiction_client
+from db.blobs import disk_errors_named
 from db.records import ContactFriction, Detection, Finding, NewModel, SampleSummary, Scale, Scales, StoredModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import BoolArray, FloatArray
@@ -273,7 +274,7 @@ def _pack(arrays: Sequence[NDArray[Any]]) -> bytes:
 def _unpack(path: Path, most: int | None = None) -> list[NDArray[Any]]:
     """All arrays of a blob, or the first ones."""
     arrays: list[NDArray[Any]] = []
-    with path.open("rb") as stream, HEADER_LOCK:
+    with disk_errors_named(), path.open("rb") as stream, HEADER_LOCK:
         while stream.peek(1) and len(arrays) != most:
             arrays.append(np.load(stream, allow_pickle=False))
     return arrays
