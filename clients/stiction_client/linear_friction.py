@@ -74,7 +74,7 @@ class SensorFriction:
             recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
         )
 
-    def at_element_area(self, part: float) -> "SensorFriction":
+    def enlarged(self, part: float) -> "SensorFriction":
         """The same for an element ``part`` times as large."""
         coefficients, covariance = _rescaled(np.array(self.coefficients), np.array(self.covariance), part)
         return replace(
@@ -131,14 +131,14 @@ class Scales:
         grasps, places, within = each
         return cls(grasps, places, within, None if sensors is None else SensorScale.from_json(sensors))
 
-    def at_element_area(self, part: float) -> "Scales":
+    def enlarged(self, part: float) -> "Scales":
         """The same for an element ``part`` times as large, over which what differs from place to place averages out."""
         places, within = (
             replace(each, value=each.value / math.sqrt(part)) for each in (self.between_places, self.within)
         )
         known = self.between_sensors
         if known is not None:
-            sensors = {name: sensor.at_element_area(part) for name, sensor in known.sensors.items()}
+            sensors = {name: sensor.enlarged(part) for name, sensor in known.sensors.items()}
             known = replace(known, sensors=sensors)
         return Scales(self.between_grasps, places, within, known)
 
@@ -275,6 +275,8 @@ class LinearFriction:
     def at_element_area(self, area: float) -> Self:
         """The same friction with forces on an element of ``area`` m²: under the same pressure it bears in proportion
         to its area, and what scatters from place to place averages out over it.
+
+        Raises ``refusal`` for an area that is not finite and above 0.
         """
         if not (area > 0.0 and math.isfinite(area)):
             raise self.refusal("area", area, "above 0 m²")
@@ -286,7 +288,7 @@ class LinearFriction:
             covariance=covariance,
             scale=self.scale / math.sqrt(part),
             domain=replace(self.domain, normal_force=(low * part, high * part)),
-            scales=None if self.scales is None else self.scales.at_element_area(part),
+            scales=None if self.scales is None else self.scales.enlarged(part),
             element_area=area,
         )
 
