@@ -75,10 +75,6 @@ class NoiseDefaults(Options):
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
     """Noise that lasts from frame to frame from which a finding reports it; less may be the field's own bends."""
-    doubt_told: Annotated[
-        float, Option(0.0, 1.0, "-", "sound ramps: up to 0.13, while stiffness is learnt at touch")
-    ] = 0.25
-    """Share of the frames in contact, in which forces do not go with displacement, from which a finding reports it."""
     step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3
     """Different places from which they may be multiples of a step."""
 
@@ -121,14 +117,6 @@ class NumericsDefaults(Options):
     """Of the moment of a contact's forces."""
     stretch_variance: Annotated[float, Option(0.0, 1e-4, "-", "rounding of a fit of many points")] = 1e-14
     """Allowed beside what linear theory of a rotation makes."""
-    agreement_seen: Annotated[float, Option(1.0, 1e6, "-", "ten standard deviations")] = 100.0
-    """Squared depth over its noise from which forces are compared with displacement."""
-    agreement_clear: Annotated[float, Option(0.0, 1e6, "-", "weighs half at two standard deviations")] = 5.0
-    """Squared force over its noise at which half of its misfit counts."""
-    agreement_rest: Annotated[float, Option(0.0, 1.0, "-", "a hundredth of the depth")] = 1e-4
-    """Squared depth over its largest at which forces are compared from anew."""
-    trusted: Annotated[float, Option(0.0, 1.0, "-", "as likely wrong as right")] = 0.5
-    """Trust in forces from which on they are used at all."""
     yaw_variance: Annotated[float, Option(0.0, 1e-4, "rad²", "rounding of a fit of many points")] = 1e-16
     """The same of a given pose's yaw."""
 
@@ -443,26 +431,6 @@ class FilterOptions(ContactOptions):
     """Least rate of the normal force over its noise."""
     stiffness_ratio: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67
     """Tangential over normal stiffness of a stuck contact."""
-    stiffness_spread: Annotated[float, Option(1e-3, 10.0, "-", "half-space to thin bonded gel")] = 0.5
-    """How far it may lie from that, before forces and displacement show it."""
-    agreement_fast: Annotated[float, Option(0.0, 10.0, "s", "a few frames against shake")] = 0.1
-    """Time constant of the low-pass on sums of forces and of displacement, and of how far they part."""
-    agreement_slow: Annotated[float, Option(0.0, 100.0, "s", "tuning scenes")] = 0.4
-    """The same of what their changes are counted from."""
-    agreement_memory: Annotated[float, Option(1e-3, 1e6, "s", "a grasp")] = 5.0
-    """Time constant of what is learnt of their proportion."""
-    agreement_error: Annotated[float, Option(0.0, 1.0, "-", "0.003 to 0.005 on elastic tuning scenes")] = 0.005
-    """What they may part by anyway, as a share of the largest normal force."""
-    agreement_misfit: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes; a creeping gel parts by 0.04")] = 0.15
-    """Misfit of forces, as a share of them, at which half of the trust is left."""
-    contact_doubted: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.05
-    """Trust in forces below which contact is found from the shape."""
-    contact_trusted: Annotated[float, Option(0.0, 1.0, "-", "not to and fro")] = 0.9
-    """Trust from which on it is found from forces again."""
-    lean_spread: Annotated[float, Option(1e-6, 10.0, "-", "normals that err by 6°")] = 0.1
-    """Crosstalk of the normal force along the surface before any is seen."""
-    lean_least: Annotated[float, Option(0.0, 10.0, "-", "normals that err by 3°")] = 0.05
-    """So much of it is let be."""
     least_transition: Annotated[float, Option(1e-15, 0.1, "-", "numerics")] = 1e-06
     """Least probability of slip and of stick that is predicted."""
     largest_log_odds: Annotated[

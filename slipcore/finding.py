@@ -18,7 +18,6 @@ SEVERITIES: dict[str, Severity] = {
     "force too large": "warning",
     "force pulls": "warning",
     "forces not believed": "note",
-    "crosstalk": "note",
     "rounded": "note",
     "lasting noise": "note",
     "smoothed": "note",

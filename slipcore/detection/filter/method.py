@@ -1,6 +1,5 @@
 """A filter of two states an element, stick and slip, on its place in the object's frame and its force ratio."""
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -11,10 +10,8 @@ from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
     COMMON,
-    DOUBTED_FRAMES,
     FORCE_FRAMES,
     LASTING,
-    LEAN,
     POSE,
     PROBABILITY,
     PULLED_FRAMES,
@@ -22,7 +19,6 @@ from slipcore.detection.filter.state import (
     ROWS,
     STICK_VARIANCE,
     TOLD_STEP,
-    TRUST,
 )
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
@@ -38,7 +34,6 @@ def start(lattice: Lattice, options: FilterOptions) -> Start:
     elements, common = np.zeros((ROWS, *lattice.position.shape[:2])), np.zeros(COMMON)
     elements[STICK_VARIANCE] = np.inf
     common[POSE + 3] = common[REFERENCE + 3] = 1.0  # not stretched
-    common[TRUST] = 1.0
     return Start(settings_of(options), elements, common)
 
 
@@ -62,7 +57,6 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
         )
         remedy = "give the force of the object on the sensor, in its frame"
         found.append(Finding("forces not believed", evidence, remedy))
-    found += disagreements(common)
     if common[TOLD_STEP] > 0.0:
         evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"
         found.append(Finding("rounded", evidence, "record places as finely as the tracker gives them"))
@@ -72,20 +66,6 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
         )
         found.append(Finding("lasting noise", evidence, "record without a low-pass; calibrate the sensor"))
     return tuple(found)
-
-
-def disagreements(common: FloatArray) -> list[Finding]:
-    """Forces that do not follow displacement, and normal forces that appear along the surface."""
-    found, frames, doubted = [], round(common[FORCE_FRAMES]), round(common[DOUBTED_FRAMES])
-    if doubted > NOISE.doubt_told * frames:
-        evidence = f"forces do not go with displacement in {doubted} of {frames} frames; slip is found without them"
-        remedy = "look for forces that are late, stand still, drift, or change their gain"
-        found.append(Finding("forces not believed", evidence, remedy))
-    lean = math.hypot(common[LEAN], common[LEAN + 1])
-    if lean > 0.0 and 2 * doubted < frames:
-        evidence = f"{lean:.0%} of the normal force appears along the surface without displacement; it was taken out"
-        found.append(Finding("crosstalk", evidence, "calibrate the sensor; look at its normals"))
-    return found
 
 
 METHOD = CompiledMethod(FilterOptions, start, run_filter, revise, findings)

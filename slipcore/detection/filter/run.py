@@ -3,7 +3,6 @@
 import math
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.state import BY_SHAPE
 from slipcore.detection.filter.step import lasting_noise, step_filter
 from slipcore.detection.filter.tuning import tuning_of
 from slipcore.detection.shared.decision import apply_decision
@@ -35,8 +34,7 @@ def filter_frame(
     velocity: FloatArray,
 ) -> tuple[float, int, int]:
     """The same in a ``room`` that is there already."""
-    trusted = before.common[BY_SHAPE] == 0.0
-    has_force = observe(sensor, frame, before, after, room, trusted)
+    has_force = observe(sensor, frame, before, after, room)
     step_filter(sensor, last, frame, before, after, room, has_force)
     touching, slipping = apply_decision(
         sensor.position, last, frame, room.decision, before, after, room.weight, velocity

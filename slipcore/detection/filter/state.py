@@ -13,14 +13,10 @@ place, m, and yaw, rad; in how many frames of contact there were forces, and pul
 and of the markers around the contact the last step, x, y m, by how much it differed from the one before, and what such
 differences say of jitter, m²; and of the frames since object or load last moved how many there are, and the means of
 pose and of load (N, or without forces m); and of markers the step in which places come, m, and the noise that lasts
-from frame to frame, m; and how far forces are trusted (see ``agreement``): whether a frame was seen, sums over the
-lattice of force, x, y, z N, and of displacement, m, low-passed fast and slowly and as at rest, mean squares and
-products of these, the squared misfit of forces since rest and of late, the largest squared Σu_z, m², what share of
-the normal force appears along x and y, and in how many frames forces were not trusted, whether contact is by shape
-for that reason, and was in the last frame.
+from frame to frame, m.
 """
 
-from slipcore.defaults import NOISE, NUMERICS
+from slipcore.defaults import NOISE
 
 ROWS = 13
 (
@@ -37,14 +33,4 @@ STEP, BEND, JITTER = SHIFT + 2, SHIFT + 4, SHIFT + 6
 HELD_FRAMES = JITTER + 2
 HELD_POSE, HELD_LOAD = HELD_FRAMES + 1, HELD_FRAMES + 5
 TOLD_STEP, LASTING = HELD_LOAD + 3, HELD_LOAD + 4
-TRUST, AGREEING = HELD_LOAD + 5, HELD_LOAD + 6
-FAST = AGREEING + 1
-SLOW, REST, NORMAL_SUMS = FAST + 6, FAST + 12, FAST + 18
-SHEAR_SUMS = NORMAL_SUMS + 2
-MISFIT = SHEAR_SUMS + 7
-MOST_PRESSED, LEAN = MISFIT + 2, MISFIT + 3
-DOUBTED_FRAMES = LEAN + 2
-BY_SHAPE, WAS_BY_SHAPE = DOUBTED_FRAMES + 1, DOUBTED_FRAMES + 2
-COMMON = WAS_BY_SHAPE + 1
-TRUSTED = NUMERICS.trusted
-"""Trust in forces from which on they are used."""
+COMMON = HELD_LOAD + 5

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.agreement import step_agreement, without_lean
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.hold import step_hold
@@ -14,12 +13,9 @@ from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
-    BY_SHAPE,
-    DOUBTED_FRAMES,
     END,
     FORCE_FRAMES,
     LASTING,
-    LEAN,
     ONSET,
     POSE,
     PROBABILITY,
@@ -32,9 +28,6 @@ from slipcore.detection.filter.state import (
     STICK_X,
     STICK_Y,
     TOLD_STEP,
-    TRUST,
-    TRUSTED,
-    WAS_BY_SHAPE,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.surroundings import shift_of_surroundings
@@ -56,23 +49,18 @@ def step_filter(
     has_force: bool,
 ) -> None:
     """Fill ``elements`` and ``common`` of the memory ``after``, and the decision, from the surface in the ``room``;
-    ``has_force``: whether there are forces that do not pull, and contact is by them.
+    ``has_force``: whether there are forces, and they do not pull.
     """
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
-    after.common[WAS_BY_SHAPE] = before.common[BY_SHAPE]
-    doubted = before.common[BY_SHAPE] > 0.0 or before.common[TRUST] < TRUSTED
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
-        if doubted:
-            after.common[DOUBTED_FRAMES] += 1.0
-        elif not has_force:
-            after.common[PULLED_FRAMES] += 1.0
+        after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last says nothing
         after.elements[ONSET] = after.elements[END] = 0.0
     else:
-        step_elements(sensor.position, last, frame, before, after, room, has_force and not doubted, tuning)
+        step_elements(sensor.position, last, frame, before, after, room, has_force, tuning)
     decide(after.elements[PROBABILITY], tuning.threshold, room.decision)
 
 
@@ -94,11 +82,6 @@ def step_elements(
     after.common[TOLD_STEP] = told_step
     after.common[LASTING] = lasting if lasting > known_or(marker_noise, tuning.unknown_noise) else 0.0
     variance, force_noise = noise_of_frame(surface, tuning)
-    noise = frame.time - last.time, variance, force_noise
-    if frame.force.size:
-        step_agreement(frame, noise, tuning, after.common)
-        if has_force and (after.common[LEAN] != 0.0 or after.common[LEAN + 1] != 0.0):
-            without_lean(frame.force, surface, after.common[LEAN], after.common[LEAN + 1])
     interval, common, elements = frame.time - last.time, before.common, before.elements
     last_pose = stored_pose(common, POSE)
     places = room.places[: find_places(elements, surface.stays, room.places)]
@@ -108,6 +91,7 @@ def step_elements(
     )
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
+    noise = interval, variance, force_noise
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, after.common)
     reference = stored_pose(common, REFERENCE)
     reference = object_motion(anchors, reference, pose, spread, tuning.motion_play, motion)
@@ -118,7 +102,7 @@ def step_elements(
         store_pose(after.common, REFERENCE, reference)
     if not (has_force and last.force.size):
         change = change[:, :0]
-    force_change(places, last.force, frame.force, (after.common[LEAN], after.common[LEAN + 1]), change)
+    force_change(places, last.force, frame.force, change)
     indentation_change(places, last.displacement, frame.displacement, deeper)
     restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning) and not held
     readiness = 0.0 if restick or math.isnan(marker_noise) else 1.0  # nor does it begin before noise is known
@@ -127,12 +111,9 @@ def step_elements(
         keep_ratios(elements, places, after.elements, told)
     elif change.size:
         weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
-        told[0] *= (before.common[TRUST] - TRUSTED) / (1.0 - TRUSTED)
     else:
         told[:] = 0.0
     start_elements(position, frame.displacement, shift, surface.stays, pose, variance, after)
-    if common[BY_SHAPE] != common[WAS_BY_SHAPE]:
-        take_over(before, after, surface.stays)
     increment = Increment(interval, variance, restick, held)
     find_offsets(anchors, pose, places, room.offsets)
     # Neighbours blur where slip begins; only what no force shows is worth that.
@@ -239,18 +220,12 @@ def indentation_change(places: NDArray[np.int64], start: FloatArray, end: FloatA
 
 
 @compiled
-def force_change(
-    places: NDArray[np.int64], before: FloatArray, now: FloatArray, lean: tuple[float, float], change: FloatArray
-) -> None:
-    """Fill the change of force [3, k] N at these places, without the share of the normal force that appears along x
-    and y; ``change`` is empty where a force is missing.
-    """
+def force_change(places: NDArray[np.int64], before: FloatArray, now: FloatArray, change: FloatArray) -> None:
+    """Fill the change of force [3, k] N at these places; ``change`` is empty where a force is missing."""
     for e in range(change.shape[1]):
         i, j = places[e]
         for a in range(3):
             change[a, e] = now[i, j, a] - before[i, j, a]
-        change[0, e] += lean[0] * change[2, e]
-        change[1, e] += lean[1] * change[2, e]
 
 
 @compiled(inline=True)
@@ -279,22 +254,6 @@ def start_elements(
                 after[STICK_X, i, j], after[STICK_Y, i, j] = x, y
                 after[SLIP_X, i, j], after[SLIP_Y, i, j] = x, y
                 after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = variance
-
-
-@compiled
-def take_over(before: Memory, after: Memory, stays: BoolArray) -> None:
-    """Elements that touch because contact is found otherwise than before slip as likely as their neighbours did."""
-    n, m = stays.shape
-    for i in range(n):
-        for j in range(m):
-            if after.contact[i, j] and not stays[i, j]:
-                total, count = 0.0, 0
-                for a in range(max(i - 1, 0), min(i + 2, n)):
-                    for b in range(max(j - 1, 0), min(j + 2, m)):
-                        if before.contact[a, b]:
-                            total += before.elements[PROBABILITY, a, b]
-                            count += 1
-                after.elements[PROBABILITY, i, j] = total / max(count, 1)
 
 
 @compiled

@@ -71,16 +71,6 @@ class Tuning(NamedTuple):
     pressing_deviations: float
     pressing_force_deviations: float
     stiffness_ratio: float
-    stiffness_spread: float
-    agreement_fast: float
-    agreement_slow: float
-    agreement_memory: float
-    agreement_error: float
-    agreement_misfit: float
-    contact_doubted: float
-    contact_trusted: float
-    lean_spread: float
-    lean_least: float
     least_transition: float
     largest_log_odds: float
     threshold: float

@@ -15,12 +15,9 @@ SERIES = NOISE.series
 
 
 @compiled(inline=True)
-def observe(
-    sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Memory, room: Workspace, trusted: bool
-) -> bool:
+def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
-    noise estimate. Whether there are forces that are ``trusted`` and do not pull: an object cannot. Else contact is by
-    shape.
+    noise estimate. Whether there are forces, and they do not pull: an object cannot, and contact is then by shape.
     """
     normal, pressing, tangential, stays, noise = room.surface
     if frame.normal.size:
@@ -46,7 +43,7 @@ def observe(
     pulls = frame.force.size > 0 and pulled(pressing, noise[1], by_force)
     if frame.contact.size:
         contact[:] = frame.contact
-    elif frame.force.size and (pulls or not trusted):
+    elif pulls:
         indent(frame.displacement, room.weight)
         find_contact(room.weight, noise[0], was, by_shape, contact)
     else:
@@ -55,7 +52,7 @@ def observe(
     for i in range(n):
         for j in range(m):
             stays[i, j] = contact[i, j] and was[i, j]
-    return frame.force.size > 0 and trusted and not pulls
+    return frame.force.size > 0 and not pulls
 
 
 @compiled
