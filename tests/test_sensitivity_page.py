@@ -33,7 +33,6 @@ WHOLE_TABLES = {
 ENTRIES = {
     "slipcore.forces.RECONSTRUCTION": ("force_to_noise", "of friction samples, which presses do not give"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
-    "slipcore.contact.ACCURACY": ("cost_order more_ahead", "not measured yet"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),
 }
 """Entries of other tables that are not on it."""

@@ -5,9 +5,10 @@
 Detectors: change of the mean F1 on scenes that no default was chosen on; those for few elements on the same scenes as
 few elements see them. Grip control: change of how many objects are held, and of the force over the least that holds.
 Patches: change of the error of a contact's friction, and of the share of frames whose regime is right. Forces: change
-of the error of forces from displacement, and of how many intervals hold the truth. Contact: change of the largest error
-against a fine solution, and of the operators' applications. Estimators: change of the error of friction at working
-points and of its interval's width, over simulated grasps. Each value is kept in its range.
+of the error of forces from displacement, and of how many intervals hold the truth. Contact: change of the largest
+error against a fine solution, and of the operators' applications; change of the error of expected times. Estimators:
+change of the error of friction at working points and of its interval's width, over simulated grasps. Each value is
+kept in its range.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from dataclasses import asdict
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.sensitivity import measures, of_new_grasps, of_samples
+from benchmarks.sensitivity import measures, of_new_grasps, of_prices, of_samples
 from benchmarks.sensitivity.rows import DEAD, Known, Row, rows_on, table_of
 
 PARTS: dict[str, Callable[[Known], list[Row]]] = {
@@ -30,6 +31,7 @@ PARTS: dict[str, Callable[[Known], list[Row]]] = {
     "smoothing": of_samples.of_smoothing,
     "forces": measures.of_presses,
     "contact": measures.of_solver,
+    "expected time": of_prices.of_prices,
     "estimators": measures.of_fits,
     **{name: of_new_grasps.part_of(name) for name in of_new_grasps.MEASURES},
 }

@@ -55,6 +55,8 @@ SCENES = {
 FINE = Fidelity(64, 4, 1e-6)
 OF_SOLVER = ("FIDELITY", "LAYER", "INFLUENCE", "NORMAL", "TANGENTIAL", "LIMIT_SURFACE", "STEP", "PROBE")
 OF_REQUESTS = ("ACCURACY",)
+OF_TIME = ("cost_order", "more_ahead")
+"""Of these, numbers that without a budget change no log (`of_prices`)."""
 OF_FITS = ("AUTOMATIC", "CLUSTERS", "GRID", "LINEAR", "REFERENCE", "IDENTIFIABILITY", "PRIOR", "ROBUST")
 OF_SAMPLED = ("PRIOR", "PROPOSAL", "SAMPLING")
 KINDS = (Kind(), Kind(between_grasps=0.1, heavy=True), Kind(between_places=0.05, force_noise=5e-3))
@@ -234,7 +236,8 @@ def error_and_cost(logs: Mapping[str, GraspLog]) -> dict[str, float]:
 
 def of_solver(known: Known) -> list[Row]:
     """Numbers of the contact simulator; those that compiled loops hold fixed stay as they are."""
-    return of_tables(of_contact, OF_SOLVER, solved, known) + of_tables(of_contact, OF_REQUESTS, asked, known)
+    of_time = {("slipcore.contact.ACCURACY", name) for name in OF_TIME}
+    return of_tables(of_contact, OF_SOLVER, solved, known) + of_tables(of_contact, OF_REQUESTS, asked, known | of_time)
 
 
 @cache

@@ -8,9 +8,16 @@ import pytest
 
 import estimators.change_alarm
 import estimators.defaults
-from benchmarks.sensitivity import of_new_grasps, of_samples
+from benchmarks.sensitivity import of_new_grasps, of_prices, of_samples
 from benchmarks.sensitivity.rows import Row, changed, every, neighbours, of_tables, rows, rows_on, table_of
+from slipcore.contact.defaults import ACCURACY
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.progress import Progress, no_progress
+from slipcore.contact.tiers import boundary_elements
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.price import Size
 from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
 from slipcore.options import Option, Options
 from stiction_client import Contact, ControlSettings
 from stiction_client.controller.settings import gains
@@ -133,3 +140,33 @@ def test_a_range_that_ends_and_a_kernel_are_found_in_fields_that_have_them(monke
     assert ended["found"] >= 0.5
     assert smoothed["width"] < 0.1
     assert smoothed["field"] < np.log(0.7)  # a third of what smoothing did is undone; noise remains
+
+
+def test_prices_that_come_true_have_no_error_and_another_power_of_the_cells_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sizes = [Size(20, cells**2) for cells in of_prices.CELLS]
+    took = tuple((size, 1e-6 * size.work(ACCURACY.overhead_cells)) for size in sizes)
+    monkeypatch.setattr(of_prices, "ladder", lambda _: took)
+    assert of_prices.price_error() == pytest.approx(0.0, abs=1e-9)
+    with changed(ACCURACY, "cost_order", 1.5):
+        assert of_prices.price_error() > 0.05
+
+
+def test_times_left_are_told_of_runs_that_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Fidelity] = []
+
+    def counted(plan: Plan, fidelity: Fidelity, progress: Progress = no_progress) -> GraspLog:
+        made.append(fidelity)
+        return boundary_elements.run(plan, fidelity, progress)
+
+    monkeypatch.setattr(of_prices, "run", counted)
+    monkeypatch.setattr(of_prices, "SCENES", {"shear": of_prices.SCENES["shear"]})
+    monkeypatch.setattr(of_prices, "ASKED", 0.1)
+    monkeypatch.setattr(of_prices, "CLOCK", of_prices.Replayed())
+    usual, count = of_prices.left_error(), len(made)
+    assert 0.0 < usual < np.log(5.0)
+    with changed(ACCURACY, "more_ahead", 5.0):
+        assert of_prices.left_error() > usual
+    assert of_prices.left_error() == usual
+    assert len(made) == count > 2
