@@ -20,12 +20,8 @@ WHOLE_TABLES = {
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",
-    "slipcore.COLLECTION": "not measured yet",
-    "slipcore.MARKERS": "not measured yet",
     "slipcore.NOISE": "compiled kernels hold it fixed",
     "slipcore.NUMERICS": "compiled kernels hold it fixed",
-    "slipcore.contact.CHEAP_TIERS": "not measured yet",
-    "slipcore.contact.EXPLAIN": "not measured yet",
     "slipcore.contact.PROJECTION": "compiled kernels hold it fixed",
 }
 """Tables of which no entry is on the page. What is measured leaves this list, and that below."""

@@ -17,7 +17,7 @@ from dataclasses import asdict
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.sensitivity import measures, of_new_grasps, of_prices, of_samples
+from benchmarks.sensitivity import measures, of_markers, of_new_grasps, of_prices, of_samples, of_scenes
 from benchmarks.sensitivity.rows import DEAD, Known, Row, rows_on, table_of
 
 PARTS: dict[str, Callable[[Known], list[Row]]] = {
@@ -25,6 +25,8 @@ PARTS: dict[str, Callable[[Known], list[Row]]] = {
     "few elements": measures.of_few_elements,
     "baselines": measures.of_baselines,
     "samples": of_samples.of_samples,
+    "collection": of_samples.of_collection,
+    "markers": of_markers.of_markers,
     "control": measures.of_control,
     "patches": measures.of_patches,
     "saturation": of_samples.of_saturation,
@@ -32,6 +34,8 @@ PARTS: dict[str, Callable[[Known], list[Row]]] = {
     "forces": measures.of_presses,
     "contact": measures.of_solver,
     "expected time": of_prices.of_prices,
+    "cheap tiers": of_scenes.of_cheap_tiers,
+    "explain": of_scenes.of_explanations,
     "estimators": measures.of_fits,
     **{name: of_new_grasps.part_of(name) for name in of_new_grasps.MEASURES},
 }

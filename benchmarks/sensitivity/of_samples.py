@@ -1,6 +1,7 @@
 """What is measured of friction samples, and of what is found in a field: the end of a sensor's range, its smoothing."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from benchmarks.forces import saturation
 from benchmarks.sensitivity.rows import Known, Row, of_tables, rows
 from slipcore import GraspLog, SampleOptions, SlipHistory, collect_samples, detect_slip
 from slipcore import defaults as of_slipcore
+from slipcore.collection import collect_friction
 from slipcore.frames import FloatArray
 from slipcore.saturation import saturated
 from slipcore.surface import smoothing
@@ -25,6 +27,8 @@ SETTINGS = (
 """Grasps as they usually are, with much noise, and of few elements."""
 MATERIALS = (9101, 9102)
 """Seeds of no other benchmark."""
+SMEARED = (0.5, 1.0, 1.5, 2.0)
+"""Standard deviations, elements, of what smooths forces in the plane."""
 WIDTHS = (0.0, 0.7, 1.2)
 """Of kernels that a field is smoothed with, elements."""
 NOISE = 1e-6
@@ -67,6 +71,32 @@ def of_samples(known: Known) -> list[Row]:
     """Which slipping elements give a sample; noise of forces is estimated unless it is given."""
     left = known | {("SampleOptions", "force_noise")}
     return list(rows("SampleOptions", SampleOptions, lambda name, value: sampled(**{name: value}), sampled(), left))
+
+
+def trusted() -> dict[str, float]:
+    """Shares of grasps whose elements are left out: as they are, and with smeared forces."""
+    shares = {}
+    for name, smeared_by in (("true left out", (0.0,)), ("smeared left out", SMEARED)):
+        told = [
+            collect_friction(smeared(log, width), history)
+            for _, _, grasps in slipping()
+            for log, history in grasps
+            for width in smeared_by
+        ]
+        shares[name] = float(np.mean([each.elements_left_out is not None for each in told]))
+    return shares
+
+
+def smeared(log: GraspLog, width: float) -> GraspLog:
+    """The log with forces in the plane that are smoothed over elements, as normal ones are not."""
+    assert log.force is not None
+    plane = gaussian_filter(log.force[..., :2], (0.0, width, width, 0.0))
+    return replace(log, force=np.concatenate([plane, log.force[..., 2:]], axis=-1))
+
+
+def of_collection(known: Known) -> list[Row]:
+    """When the contact is trusted and its elements are not."""
+    return of_tables(of_slipcore, ("COLLECTION",), trusted, known)
 
 
 @cache

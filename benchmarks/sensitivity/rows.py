@@ -19,6 +19,8 @@ import slipcore.forces.defaults
 from estimators import change_alarm, grasp_design, online, population, recognition
 from slipcore import METHODS, CheckOptions, PatchOptions, SampleOptions
 from slipcore.contact.elasticity import bonded_layer
+from slipcore.contact.scene import explain
+from slipcore.contact.tiers import beam_lattice
 from slipcore.errors import SlipcoreError
 from slipcore.options import Option, Options, describe_options
 from stiction_client import ControlSettings, InvalidArgument
@@ -35,7 +37,7 @@ MODULES = (
     slipcore.forces.defaults,
     estimators.defaults,
 )
-READ_ONCE = (recognition, change_alarm, online, population, grasp_design)
+READ_ONCE = (recognition, change_alarm, online, population, grasp_design, explain, beam_lattice)
 """Modules that read a table as they are imported."""
 Key = tuple[str, str]
 """A table's qualified name, and that of one of its entries."""

@@ -1,5 +1,5 @@
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 from typing import Annotated
 
@@ -8,12 +8,14 @@ import pytest
 
 import estimators.change_alarm
 import estimators.defaults
-from benchmarks.sensitivity import of_new_grasps, of_prices, of_samples
+import slipcore.contact.defaults
+from benchmarks.sensitivity import of_new_grasps, of_prices, of_samples, of_scenes
 from benchmarks.sensitivity.rows import Row, changed, every, neighbours, of_tables, rows, rows_on, table_of
-from slipcore.contact.defaults import ACCURACY
+from slipcore.contact.defaults import ACCURACY, CHEAP_TIERS, EXPLAIN
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
-from slipcore.contact.tiers import boundary_elements
+from slipcore.contact.scene import explain
+from slipcore.contact.tiers import beam_lattice, boundary_elements
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.contact.tiers.price import Size
 from slipcore.errors import InvalidInput
@@ -128,6 +130,36 @@ def test_a_number_that_a_module_reads_once_is_changed_there_too() -> None:
         assert len(estimators.change_alarm.TAUS) == 7
     assert len(estimators.change_alarm.TAUS) == expected
     assert estimators.change_alarm.ChangeAlarm is kind  # what others hold of it can be stored still
+
+
+def test_coarse_runs_and_beams_have_the_cells_of_a_changed_table() -> None:
+    with changed(slipcore.contact.defaults.EXPLAIN, "cells", 7):
+        assert explain.COARSE_RUNS.cells == 7
+    with changed(slipcore.contact.defaults.CHEAP_TIERS, "beam_cells", 6):
+        assert beam_lattice.ONE_CELL_AN_ELEMENT.cells == 6
+    assert (explain.COARSE_RUNS.cells, beam_lattice.ONE_CELL_AN_ELEMENT.cells) == (10, 4)
+
+
+def test_a_promise_is_looked_at_beside_the_error_and_explanations_that_are_refused_are_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told, twice = of_scenes.cheaply(), replace(CHEAP_TIERS, beam_error=2.0 * CHEAP_TIERS.beam_error)
+    monkeypatch.setattr(beam_lattice, "CHEAP_TIERS", twice)
+    changed_by = {name: value - told[name] for name, value in of_scenes.cheaply().items()}
+    assert changed_by.pop("beams promise") == pytest.approx(math.log(2.0))
+    assert set(changed_by.values()) == {0.0}
+    monkeypatch.setattr(of_scenes, "EXPLAINED", of_scenes.EXPLAINED[:2])
+    assert of_scenes.explained()["given"] == 1.0
+    monkeypatch.setattr(explain, "EXPLAIN", replace(EXPLAIN, most_runs=1))
+    assert of_scenes.explained()["given"] == 0.0
+
+
+def test_smeared_forces_are_told_from_forces_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(of_samples, "SETTINGS", of_samples.SETTINGS[:1])
+    monkeypatch.setattr(of_samples, "MATERIALS", of_samples.MATERIALS[:1])
+    of_samples.slipping.cache_clear()
+    assert of_samples.trusted() == {"true left out": 0.0, "smeared left out": 0.5}
+    of_samples.slipping.cache_clear()
 
 
 def test_a_range_that_ends_and_a_kernel_are_found_in_fields_that_have_them(monkeypatch: pytest.MonkeyPatch) -> None:
