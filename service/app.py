@@ -3,6 +3,7 @@
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
 from functools import partial
+from typing import NamedTuple
 
 from fastapi import FastAPI
 
@@ -129,42 +130,14 @@ async def running(
     with closing(Database(settings.resolved_database_url)) as database:
         blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
         with shared(settings.data_folder, partial(_enter, settings, database, blobs, check)):
-            config = StoreConfig(
-                database.url,
-                settings.data_folder,
-                settings.blob_url,
-                settings.blob_cache_bytes,
-                settings.job_memory_bytes,
-                settings.scatter_from_other_materials,
-            )
-            chosen = config, settings.workers, settings.dask_address, settings.job_cpu_seconds
-            runner = JobRunner(
-                database,
-                executors(*chosen),
-                executor_for_short_jobs(*chosen),
-                attempts=settings.job_attempts,
-                lease_seconds=settings.lease_seconds,
-                poll_seconds=settings.poll_seconds,
-                shutdown_seconds=settings.shutdown_seconds,
-            )
+            runner = _job_runner(settings, database)
             for_clients, for_the_store = FairThreads(), FairThreads()
             readers = Readers(
                 settings.read_seconds, settings.readers, settings.reading_bytes, for_clients, blobs.folder
             )
             streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
-            retention = Retention(
-                database,
-                blobs,
-                settings.keep_uploads_days,
-                lambda: runner.leads,
-                unreferenced_days=settings.keep_unreferenced_days,
-                audit_days=settings.keep_audit_days,
-            )
-            scrub = Scrub(database, blobs, settings.scrub_bytes_per_second, lambda: runner.leads)
-            watch = StoreWatch(database, blobs)
-            webhook = Webhook(database, settings.webhook_url, settings.webhook_secret, lambda: runner.leads)
-            threads = (retention, scrub, watch, webhook)
+            threads = _background(settings, database, blobs, runner)
             for thread in threads:
                 thread.start()
             try:
@@ -179,8 +152,8 @@ async def running(
                     threads=for_clients,
                     store_threads=for_the_store,
                     streams=streams,
-                    scrub=scrub,
-                    watch=watch,
+                    scrub=threads.scrub,
+                    watch=threads.watch,
                 )
             finally:
                 for thread in threads:
@@ -190,6 +163,59 @@ async def running(
                 await readers.stop()
                 for_clients.stop()
                 for_the_store.stop()
+
+
+def _job_runner(settings: Settings, database: Database) -> JobRunner:
+    """What runs jobs, in processes that open the stores by themselves."""
+    config = StoreConfig(
+        database.url,
+        settings.data_folder,
+        settings.blob_url,
+        settings.blob_cache_bytes,
+        settings.job_memory_bytes,
+        settings.scatter_from_other_materials,
+    )
+    chosen = config, settings.workers, settings.dask_address, settings.job_cpu_seconds
+    return JobRunner(
+        database,
+        executors(*chosen),
+        executor_for_short_jobs(*chosen),
+        attempts=settings.job_attempts,
+        lease_seconds=settings.lease_seconds,
+        poll_seconds=settings.poll_seconds,
+        shutdown_seconds=settings.shutdown_seconds,
+    )
+
+
+class Background(NamedTuple):
+    """What runs beside requests and jobs; all but the watch only where the runner leads."""
+
+    retention: Retention
+    scrub: Scrub
+    watch: StoreWatch
+    webhook: Webhook
+
+
+def _background(settings: Settings, database: Database, blobs: BlobStore, runner: JobRunner) -> Background:
+    """None of it started."""
+
+    def leads() -> bool:
+        return runner.leads
+
+    retention = Retention(
+        database,
+        blobs,
+        settings.keep_uploads_days,
+        leads,
+        unreferenced_days=settings.keep_unreferenced_days,
+        audit_days=settings.keep_audit_days,
+    )
+    return Background(
+        retention,
+        Scrub(database, blobs, settings.scrub_bytes_per_second, leads),
+        StoreWatch(database, blobs),
+        Webhook(database, settings.webhook_url, settings.webhook_secret, leads),
+    )
 
 
 def _enter(
