@@ -8,7 +8,8 @@ first, then those of compiled kernels, and last what must be imported anew, as c
 without: a mutant is tried with the test files that have the name of its module or import it, and what survives these
 may be killed by others, in a run `--again`. `--budget` is the seconds of tests for each, `--seconds` ends a run early.
 `--part 1/2` and `--part 2/2` share one, each with a `--work` of its own; the files of verdicts are put together by
-hand. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints.
+hand. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints. `--sample` is
+for another sample on the same page.
 """
 
 import argparse
@@ -23,7 +24,7 @@ from pathlib import Path
 
 from benchmarks.mutants import sample, verdicts
 from benchmarks.mutants.edits import Edit, edits
-from benchmarks.mutants.page import tables
+from benchmarks.mutants.page import score, tables
 from benchmarks.mutants.scratch_copy import ROOT, ScratchCopy
 from benchmarks.mutants.verdicts import BUDGET, Court, Verdict
 from benchmarks.pages import options as page_options
@@ -49,7 +50,7 @@ def main() -> None:
 
 def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
     drawn = sample.draw(copy.root, options.count, options.seed)
-    path = options.work / f"verdicts-{options.seed}.jsonl"
+    path = _verdicts(options)
     found = verdicts.known(path)
     waiting = [edit for edit in drawn if edit.key not in found or (options.again and not found[edit.key].is_killed)]
     part, parts = map(int, options.part.split("/"))
@@ -57,6 +58,10 @@ def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
     if waiting and options.seconds > 0.0:
         _try(waiting, found, path, copy, options)
     _write(copy, drawn, found, options)
+
+
+def _verdicts(options: argparse.Namespace) -> Path:
+    return Path(options.work / f"verdicts-{options.seed}.jsonl")
 
 
 def _try(
@@ -86,6 +91,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--budget", type=float, default=BUDGET, help="seconds of tests that a mutant is tried with")
     parser.add_argument("--cover", nargs="*", metavar="TESTS", help="run the tests with coverage first")
     parser.add_argument("--near", action="store_true", help="do not ask first which tests run which line")
+    parser.add_argument("--sample", help="its name in those of the page's tables, one of which counts first verdicts")
     parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--only", metavar="PLACE", help="a file, or file:line")
     return parser.parse_args()
@@ -114,8 +120,13 @@ def _line(edit: Edit, verdict: Verdict) -> str:
 
 def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], options: argparse.Namespace) -> None:
     reasons = tomllib.loads(EXPLAINED.read_text())
-    made = tables(drawn, found, reasons, sample.lines_of(copy.root))
-    print(made["score"])
+    lines = sample.lines_of(copy.root)
+    made = tables(drawn, found, reasons, lines)
+    if options.sample:
+        first = verdicts.known(_verdicts(options), at_first_sight=True)
+        made["first sight"] = score(drawn, first, reasons, lines)
+        made = {f"{name} {options.sample}": table for name, table in made.items()}
+    print(*made.values(), sep="\n\n")
     picture_folder(options)
     if options.page is not None and not options.page.exists():
         shutil.copyfile(PAGE, options.page)

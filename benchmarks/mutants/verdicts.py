@@ -70,11 +70,12 @@ class Verdict:
         return bool(self.by)
 
 
-def known(path: Path) -> dict[str, Verdict]:
-    """The verdicts of a file, by the key of their edits; the last of each counts."""
+def known(path: Path, *, at_first_sight: bool = False) -> dict[str, Verdict]:
+    """The verdicts of a file, by the key of their edits; of each the last counts, or the first."""
     if not path.exists():
         return {}
-    return {verdict.key: verdict for line in path.read_text().splitlines() for verdict in [Verdict(**json.loads(line))]}
+    told = [Verdict(**json.loads(line)) for line in path.read_text().splitlines()]
+    return {verdict.key: verdict for verdict in (reversed(told) if at_first_sight else told)}
 
 
 def append(path: Path, verdict: Verdict) -> None:

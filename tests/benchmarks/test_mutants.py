@@ -328,6 +328,7 @@ def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
     verdicts.append(path, first)
     verdicts.append(path, second)
     assert verdicts.known(path) == {"a": second}
+    assert verdicts.known(path, at_first_sight=True) == {"a": first}
     assert json.loads(path.read_text().splitlines()[0])["by"] == ""
 
 
