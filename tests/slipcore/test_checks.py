@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from service.domain.reconstruct import CONTRADICTED, RECONSTRUCTED
-from slipcore import Finding, GraspLog, InvalidInput, check_log, detect_slip
+from slipcore import Finding, GraspLog, InvalidInput, check_log, collect_friction, detect_slip
 from slipcore.checks import AGAINST_FRICTION
 from slipcore.checks.contact import _load_ratio
 from slipcore.checks.subject import Subject
@@ -369,3 +369,16 @@ def test_severity_parts_what_makes_friction_doubtful_from_what_informs() -> None
     assert Finding("no rest", "", "").severity == "note"
     assert Finding("of a newer version", "", "").severity == "note"
     assert {name for name in SEVERITIES if Finding(name, "", "").severity == "warning"} == AGAINST_FRICTION
+
+
+def test_what_is_told_in_per_cent_of_friction_is_the_same_of_twice_the_friction(long_ramp: GraspLog) -> None:
+    log = with_gains(long_ramp)
+    history = detect_slip(log, lookahead=2)
+    samples = collect_friction(log, history).elements
+    twice = replace(samples, friction_coefficient=2.0 * samples.friction_coefficient)
+    told, again = (
+        {each.name: each.evidence for each in check_log(log, history, friction)} for friction in (samples, twice)
+    )
+    for name in ("friction differs by place", "scatter beyond noise"):
+        assert "%" in told[name]
+        assert again[name] == told[name]

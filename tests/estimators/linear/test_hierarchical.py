@@ -220,3 +220,35 @@ def test_a_narrow_range_of_force_far_from_zero_pulls_nothing() -> None:
     assert model.predict(2e-4, 5.0) == pytest.approx(0.43, abs=0.02)
     assert model.scales is not None
     assert model.scales.between_grasps.value < 0.15
+
+
+def test_the_last_grid_has_more_nodes_for_two_scales_than_for_three() -> None:
+    one = [grasp(seed) for seed in range(3)]
+    several = [replace(each, sensor=f"{seed}") for seed, each in enumerate(one)]
+    assert [len(axis) for axis in posterior_grid(gather(one)).axes] == [GRID.fine] * 2
+    axes = posterior_grid(gather(several)).axes
+    assert [len(axis) for axis in axes[:2]] == [GRID.beside_gains] * 2
+    assert GRID.beside_gains < GRID.fine
+
+
+def test_the_shift_by_the_prior_is_that_of_the_dense_model_whose_prior_is_twice_as_wide(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data = gather([grasp(k, n=6) for k in range(2)])
+    grid = posterior_grid(data)
+    lam, rho = (
+        float(axis[place])
+        for axis, place in zip(
+            grid.axes, np.unravel_index(grid.log_marginal.argmax(), grid.log_marginal.shape), strict=True
+        )
+    )
+    whole = grid.model.whole(grid.model.products(np.array([lam]), np.array([rho])))
+    sigma = float(np.exp(grid.model.log_sigma(whole)[0][0]))
+    about = grid.model.pooled.root @ grid.model.direction
+    scales = sigma, sigma * float(np.exp(0.5 * lam)), sigma * float(np.exp(0.5 * rho))
+    _, narrow, covariance = dense(data, about, grid.model.offset, scales)
+    monkeypatch.setitem(globals(), "PRIOR", replace(PRIOR, width=2.0 * PRIOR.width))
+    _, wide, _ = dense(data, about, grid.model.offset, scales)
+    expected = np.abs(wide - narrow) / np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(grid.prior_shift(), expected, rtol=1e-5)
+    assert expected.min() > 1e-5

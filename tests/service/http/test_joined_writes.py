@@ -4,7 +4,9 @@ import asyncio
 import socket
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from types import SimpleNamespace
 from typing import cast
 
@@ -152,3 +154,18 @@ def test_what_waits_counts_as_not_sent() -> None:
         return [*sizes, joined.get_write_buffer_size()]
 
     assert asyncio.run(waiting()) == [9, 5]
+
+
+def test_who_reads_as_fast_as_more_is_written_is_kept_until_it_stops() -> None:
+    soon, later = list[Callable[[], None]](), list[Callable[[], None]]()
+    loop = SimpleNamespace(call_soon=soon.append, call_later=lambda _, look, least: later.append(partial(look, least)))
+    sent = Sent()
+    joined = JoinedWrites(cast(asyncio.Transport, sent), cast(asyncio.AbstractEventLoop, loop))
+    joined.watch()
+    for _ in range(3):
+        joined.write(bytes(int(joined_writes.UNREAD_SECONDS * joined_writes.SLOWEST_READ)))
+        soon.pop()()
+        later.pop()()  # as many bytes wait as before: so many were read
+        assert "abort" not in sent.told
+    later.pop()()
+    assert sent.told[-1] == "abort"

@@ -6,6 +6,7 @@ import pytest
 from service.report.material import material_report
 from service.report.page import render
 from service.report.pictures import friction_sections, marginals
+from slipcore.samples import FrictionSamples
 from stiction_client.model import Cost, FrictionModel
 from stiction_client.records import Material, NextGrasp
 from stiction_client.support import Domain
@@ -70,3 +71,28 @@ def test_each_marginal_density_is_highest_within_its_interval(freedom: float) ->
     low, high = model.scale_interval(0.95)
     assert low <= model.scale <= high
     assert (low == high) == np.isinf(freedom)
+
+
+def test_the_sections_say_what_is_drawn_in_them() -> None:
+    (left, right) = friction_sections(MODEL).axes
+    assert left.get_legend() is not None
+    assert {text.get_text() for text in left.get_legend().get_texts()} == {"fitted", "90 % of new observations"}
+    assert right.get_legend() is None
+
+
+def test_samples_that_agree_fill_an_axis_that_is_narrow_about_them() -> None:
+    friction = np.full(20, 0.1)
+    samples = FrictionSamples(
+        friction,
+        np.full(20, 5e-4),
+        np.full(20, 0.05),
+        0.05 * friction,
+        np.arange(20.0),
+        np.arange(20),
+        np.ones(20),
+        1e-6,
+    )
+    low, high = friction_sections(MODEL, samples).axes[0].get_ylim()
+    assert 0.09 < low < 0.1 < high < 0.11
+    low, high = friction_sections(replace(MODEL, scale=1e-4, covariance=1e-8 * MODEL.covariance)).axes[0].get_ylim()
+    assert 1.2 * 0.02 * 0.1 < high - low < 1.5 * 0.02 * 0.1  # what the line does over the forces, its band, and margins

@@ -1,6 +1,7 @@
 """Live detectors, without the process and the network around them."""
 
 import json
+import re
 import struct
 from contextlib import suppress
 from threading import Event
@@ -138,3 +139,14 @@ def test_who_goes_takes_the_looks_along_that_have_not_begun(ramp: GraspLog, monk
     assert session.look is not None
     assert session.look.cancelled()
     may_go.set()
+
+
+def test_a_frame_is_taken_in_each_length_that_a_refusal_allows() -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        detectors._array("force", b"12345", (2, 3))
+    lengths = [int(length) for length in re.findall(r"\d+", refusal.value.allowed.partition(":")[0])]
+    assert len(lengths) == 2
+    for length in lengths:
+        assert detectors._array("force", bytes(length), (2, 3)).tolist() == [[0.0] * 3] * 2
+    with pytest.raises(InvalidInput, match=r"5 numbers.*6: \[2, 3\]"):
+        detectors._array("force", [1.0] * 5, (2, 3))

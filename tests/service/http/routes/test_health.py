@@ -4,7 +4,10 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 import httpx
+import pytest
 
+from db.database import Database
+from db.errors import StorageUnavailable
 from service.settings import Settings
 
 
@@ -25,3 +28,18 @@ def test_readiness_names_what_is_missing(
     assert response.headers["retry-after"] == "1"
     assert response.json()["type"] == "/problems/storage-unavailable"
     assert "blob folder" in response.json()["detail"]
+
+
+def test_readiness_asks_the_database_too(
+    serving: Callable[[Settings], AbstractContextManager[httpx.Client]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_: Database) -> None:
+        raise StorageUnavailable("the database does not answer")
+
+    with serving(Settings(data_folder=tmp_path, workers=0)) as client:
+        with monkeypatch.context() as patched:
+            patched.setattr(Database, "ping", gone)
+            response = client.get("/readyz")
+        assert client.get("/readyz").status_code == httpx.codes.OK
+    assert (response.status_code, response.json()["type"]) == (503, "/problems/storage-unavailable")
+    assert "database" in response.json()["detail"]

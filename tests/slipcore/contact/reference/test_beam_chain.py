@@ -212,3 +212,12 @@ def test_impossible_lattices_are_refused_by_name(
 def test_impossible_limits_are_refused_by_name(limit: np.ndarray) -> None:
     with pytest.raises(InvalidInput, match="limit"):
         drag(CHAIN, unloaded(CHAIN), np.zeros(3), limit)
+
+
+def test_a_moment_is_carried_up_to_what_friction_holds_about_the_middle() -> None:
+    limit = pressed(PATCH, 2.0, 2.8e-3)
+    most = float((np.hypot(*np.moveaxis(PATCH.position, -1, 0)) * limit).sum())
+    state = push(PATCH, unloaded(PATCH), np.array([0.0, 0.0, 0.99 * most]), limit)
+    assert PATCH.resultants(state.force)[2] == pytest.approx(0.99 * most, rel=1e-6, abs=0.0)
+    with pytest.raises(InfeasibleLoad):
+        push(PATCH, unloaded(PATCH), np.array([0.0, 0.0, 1.01 * most]), limit)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
-from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz, cycle_dissipation
+from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz, _slip_front, cycle_dissipation
 from slipcore.errors import InvalidInput
 
 Integrals = Callable[[float, float, float], dict[str, float]]
@@ -212,3 +212,12 @@ def test_rigid_motion_of_an_independent_solution_through_two_reversals() -> None
         found.append(state.rigid_displacement)
     # its README: 0.34 % against closed form, of which most is the neglected lateral slip at this Poisson's ratio
     np.testing.assert_allclose(found, rigid, atol=5e-3 * np.abs(rigid).max())
+
+
+def test_a_change_of_load_by_rounding_alone_forgets_nothing(fresh: MindlinDeresiewicz) -> None:
+    state = fresh.load(FORCE, 0.9 * LIMIT).load(FORCE, -0.5 * LIMIT).load(FORCE, 0.1 * LIMIT)
+    whole = float(np.dot(state.memory, np.diff(state.levels)))
+    assert len(state.memory) > 2
+    for limit in (FRICTION, -FRICTION):
+        nearly = whole - 1e-9 * np.copysign(LIMIT, limit)  # less than the memory itself holds: nothing slips
+        assert _slip_front(state.levels, state.memory, FORCE, nearly, limit) == state.levels[-1]

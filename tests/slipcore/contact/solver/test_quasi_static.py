@@ -193,3 +193,9 @@ def test_slip_is_looked_for_only_where_the_bodies_touch(monkeypatch: pytest.Monk
     for touches, box in boxes:
         assert touches[box].sum() == touches.sum() > 0
         assert touches[box].size < 4 * touches.sum()
+
+
+def test_bodies_apart_bear_no_load_and_nothing_has_moved() -> None:
+    state = QuasiStatic(sphere_on(0.3), Grid.square(8, 11e-3)).start()
+    assert (state.load.normal_force, state.load.approach) == (0.0, None)
+    assert not any(np.any(field) for field in (state.load.tangential, state.load.motion, state.stress.pressure))

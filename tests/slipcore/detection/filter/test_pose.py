@@ -5,7 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from slipcore.detection.filter.pose import Anchors, Pose, fit_pose, place_of_object, place_on_object, pose_at
+from slipcore.detection.filter.pose import (
+    AnchorMotion,
+    Anchors,
+    Pose,
+    PoseVariance,
+    fit_pose,
+    object_motion,
+    place_of_object,
+    place_on_object,
+    pose_at,
+)
 
 NOTHING_GIVEN = np.empty(0)
 STIFF, LOOSE = 1e12, 1e4
@@ -68,3 +78,14 @@ def test_a_place_goes_to_the_object_and_back() -> None:
     pose = pose_at(1e-3, -2e-3, 2.5, 1.02)
     there = place_of_object(pose, 3e-3, 4e-3)
     np.testing.assert_allclose(place_on_object(pose, *there), [3e-3, 4e-3], rtol=1e-12, err_msg="rounding")
+
+
+@pytest.mark.parametrize(("moved", "kept"), [(1e-5, 1.0 - 0.2), (1e-4, 1.0 - 0.02), (1e-6, 0.0), (0.0, 0.0)])
+def test_of_a_motion_is_left_what_its_jitter_does_not_explain(moved: float, kept: float) -> None:
+    """(1 − √(Σσ²/Σd²)) d, for a deviation of 2 µm and a play of one deviation."""
+    places, motion = anchors(0.0, 1.0), AnchorMotion(*np.empty((3, 16)))
+    start, end, spread = pose_at(0.0, 0.0, 0.0, 1.0), pose_at(moved, 0.0, 0.0, 1.0), PoseVariance(4e-12, 0.0, 0.0, 0.0)
+    reference = object_motion(places, start, end, spread, 1.0, motion)
+    np.testing.assert_allclose(motion.x, kept * moved, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(motion.variance, 4e-12, rtol=1e-12)
+    assert reference.x == pytest.approx(kept * moved, rel=1e-9, abs=1e-15)

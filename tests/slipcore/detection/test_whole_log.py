@@ -1,0 +1,19 @@
+"""What is told of a whole log, from what was found in each of its frames."""
+
+import numpy as np
+
+from slipcore import GraspLog
+from slipcore.detection.fold import FrameResults
+from slipcore.detection.whole_log import _history
+
+
+def test_a_contact_of_one_element_slips_as_a_whole_or_not_at_all() -> None:
+    time, position = np.arange(3) / 30.0, np.array([[[0.0, 0, 0], [1e-3, 0, 0]], [[0, 1e-3, 0], [1e-3, 1e-3, 0]]])
+    log = GraspLog(time, position, np.zeros((3, 2, 2, 3)), 1e-6)
+    contact, slip = np.zeros((2, 3, 2, 2), bool)
+    contact[1:, 0, 1] = slip[2, 0, 1] = True
+    counts = (field.sum(axis=(1, 2)) for field in (contact, slip))
+    found = FrameResults(contact, slip, slip.astype(float), np.zeros((3, 2, 2, 2)), *counts)
+    history = _history(log, "filter", 1e-6, found)
+    np.testing.assert_array_equal(history.macro_slip, [False, False, True])
+    np.testing.assert_array_equal(history.stick_ratio, [np.nan, 1.0, 0.0])
