@@ -73,12 +73,14 @@ def _effect(model: FrictionModel, grasp: GraspStatistics, unit: float) -> GraspE
 def _square(grasp: GraspStatistics, unit: float, places: float, within: float) -> FloatArray:
     """Σ x xᵀ [4, 4] over the samples' x = (1, v, f_n, μ), by the inverse covariance of what adds to the law.
 
-    The mean of a place of weight W has the variance ω² + σ²/W, a deviation from it σ²/w.
+    The mean of a place of weight W has the variance ω² + σ²/W, a deviation from it σ²/w; that of an only place shows
+    nothing of its grasp (``linear.hierarchical``).
     """
     inverse = 1.0 / (places**2 + within**2 / (unit * grasp.weight))
     means = np.sqrt(inverse * grasp.independent)[:, None] * np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
     spread = (np.sqrt(inverse * grasp.share)[:, None, None] * grasp.spread).reshape(-1, 3)
-    deviations = np.concatenate([spread, np.sqrt(unit) / within * grasp.within])
+    told = 0.0 if grasp.of_one_place else np.sqrt(unit) / within
+    deviations = np.concatenate([spread, told * grasp.within])
     rows = np.concatenate([means, np.pad(deviations, ((0, 0), (1, 0)))])
     return np.asarray(rows.T @ rows)
 

@@ -69,6 +69,11 @@ class GraspStatistics:
         """As how many independent places each group [g] counts."""
         return self.count * self.share
 
+    @property
+    def of_one_place(self) -> bool:
+        """Whether all samples are of one place, whose level then shows its grasp's and its own scatter together."""
+        return len(self.count) == 1 and float(self.count[0]) == 1.0
+
     @classmethod
     def from_columns(
         cls, columns: Columns, noise: FloatArray = NO_NOISE, velocity_unknown: bool = False

@@ -3,6 +3,9 @@
 A sample k of place e in grasp g observes ``μ = (1 + u_g) x·β + p_ge + ε_k`` with x = (1, v, f_n), u ~ N(0, τ²),
 p ~ N(0, ω²), ε ~ N(0, σ²/w_k): a grasp scales the whole law, a place shifts it (Searle et al., 1992, ch. 6).
 
+Of a grasp of one place only the level is scaled: h is x·b̂ of the place's mean. Else p_ge could make up for any u_g, and
+slopes that differ from grasp to grasp, as errors that go together over time make them, would pass for an endless τ.
+
 Given λ = τ²/σ² and ρ = ω²/σ², the places are integrated out by giving the mean of a place of weight W the weight
 W/(1 + ρW) (Lindley & Smith, 1972), the grasp by the rank-one update of Sherman and Morrison along h = x·b̂, with b̂ near
 the coefficients' mean; determinants follow from the same two. What is left is a normal density of β.
@@ -98,8 +101,8 @@ class Hierarchical:
     of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
     each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂;
     ``unknown`` [g]: grasps of unknown velocity, whose friction is off, all alike, by N(0, ``offset``) times each of the
-    columns that ``off_by`` [2, 3] are the γ of. Grasps are in the order of their ``sensors``: those of the j-th are
-    from ``first[j]`` to ``first[j + 1]``, of [s + 1].
+    columns that ``off_by`` [2, 3] are the γ of; ``of_one_place`` [g]. Grasps are in the order of their ``sensors``:
+    those of the j-th are from ``first[j]`` to ``first[j + 1]``, of [s + 1].
     """
 
     group: FloatArray
@@ -114,6 +117,7 @@ class Hierarchical:
     unknown: NDArray[np.bool_]
     offset: float
     off_by: FloatArray
+    of_one_place: NDArray[np.bool_]
     first: NDArray[np.int64]
     sensors: tuple[str, ...]
     scatter_prior: ScatterPrior = WEAK
@@ -128,8 +132,10 @@ class Hierarchical:
     def _given_rho(self, ratio: FloatArray, rho: float) -> Products:
         """Sums for all λ [l]: what a grasp says across h stays, what it says along h shrinks by 1/(1 + λ h'h)."""
         shrunk = self.weight / (1.0 + rho * self.weight)
-        grasp = self.within + np.add.reduceat(shrunk * self.group, self.start, axis=1).T
-        along = grasp[:, WHOLE[:, :3]] @ self.direction  # [g, 4]
+        level = np.add.reduceat(shrunk * self.group, self.start, axis=1).T
+        grasp = self.within + level
+        scaled = np.where(self.of_one_place[:, None], level, grasp)
+        along = scaled[:, WHOLE[:, :3]] @ self.direction  # [g, 4]
         size = np.maximum(along[:, :3] @ self.direction, np.finfo(float).tiny)
         outer = along[:, FIRST] * along[:, SECOND] / size[:, None]
         growth = 1.0 + ratio[:, None] * size
@@ -283,6 +289,7 @@ def hierarchical(
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
         off_by=np.stack([_direction(pooled, each) for each in columns_off(float(centre[2]))]),
+        of_one_place=np.array([grasp.of_one_place for grasp in grasps]),
         first=np.append(first, len(grasps)),
         sensors=tuple(sensors.tolist()),
         scatter_prior=scatter_prior,

@@ -6,7 +6,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from scipy import special, stats
+from scipy import signal, special, stats
 
 import estimators
 from estimators.defaults import GRID, PRIOR, REFERENCE
@@ -42,6 +42,10 @@ def dense(
     assert seen is not None
     x = np.column_stack([np.ones(len(seen)), seen.tangential_velocity, seen.normal_force])
     place, expected = seen.place(), x @ about
+    for grasp in range(int(seen.grasp.max()) + 1):
+        own = seen.grasp == grasp
+        if len(np.unique(place[own])) == 1:  # whose level alone its grasp scales
+            expected[own] = np.average(expected[own], weights=seen.weight[own])
     noise = np.diag(sigma**2 / seen.weight)
     noise += omega**2 * (place[:, None] == place)
     for column in columns_off(float(data.mean_row()[2])):
@@ -80,6 +84,42 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int, unkno
         theirs.append(log)
     for (a, b), (c, d) in zip(pairwise(ours), pairwise(theirs), strict=True):
         np.testing.assert_allclose(a - b, c - d, rtol=1e-8, atol=1e-7)
+
+
+def test_of_grasps_of_one_place_only_the_level_is_scaled() -> None:
+    grasps = [grasp(k) for k in range(4)]
+    data = gather([replace(part, element=part.element * (k % 2)) for k, part in enumerate(grasps)])
+    model = hierarchical(
+        data.grasp_statistics(),
+        exact_posterior(data),
+        weak_spans(data.domain, data.element_area),
+        data.mean_row(),
+    ).centred_at(TRUTH)
+    ours, theirs = [], []
+    for sigma, tau, omega in [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.03, 0.5, 0.3)]:
+        ratios = np.log([tau**2 / sigma**2]), np.log([omega**2 / sigma**2])
+        given = model.conditional(model.whole(model.products(*ratios)), np.stack([np.log([sigma]), *ratios]))
+        log, mean, covariance = dense(data, TRUTH, model.offset, (sigma, tau, omega))
+        np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)
+        np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
+        ours.append(given.log_density[0] - log_prior(*np.log([[sigma], [tau], [omega]]))[0])
+        theirs.append(log)
+    np.testing.assert_allclose(np.diff(ours), np.diff(theirs), rtol=1e-8, atol=1e-7)
+
+
+def test_slopes_that_errors_over_time_feign_are_no_scatter_between_grasps() -> None:
+    """Grasps of one place each, as of a force sensor: their scatter of 3 % is found, whatever slopes they show."""
+    rng, count = np.random.default_rng(3), 400
+    grasps = []
+    for _ in range(12):
+        drift = [signal.lfilter([0.1], [1.0, -0.995], rng.standard_normal(3000))[-count:] for _ in range(3)]
+        v, f_n = np.abs(2e-3 + 5e-4 * drift[0]), 5.0 + 0.3 * drift[1]
+        mu = (1.0 + 0.03 * rng.standard_normal()) * (0.5 + 4.0 * v - 0.01 * f_n) + 0.01 * drift[2]
+        time, one = np.arange(count) * 0.005, np.ones(count)
+        grasps.append(FrictionSamples(mu, v, f_n, mu * f_n, time, np.zeros(count, dtype=np.int64), one, 1e-4))
+    model = estimators.fit(grasps, method="hierarchical")
+    assert model.scales is not None
+    assert 0.015 < model.scales.between_grasps.value < 0.06
 
 
 @pytest.mark.parametrize("unknown", [0, 2])
