@@ -9,7 +9,7 @@ planned_force.json.
 
 `--nested`: instead, logs come one by one, and each material is fitted after each of them as the service does. Counted
 are the steps by which an answer vanishes, and by which the friction that a planner may count on falls by more than a
-tenth, and whether the log that did it is named. Writes planned_force_nested.json.
+twentieth, and whether the log that did it is named. Writes planned_force_nested.json.
 """
 
 import os
@@ -121,7 +121,8 @@ def row(found: Sequence[Case]) -> list[object]:
 
 class Step(NamedTuple):
     """One more log of a material, from so many ``logs``: loads ``answered`` before, how many of these ``vanished``;
-    whether the friction that may be counted on ``fell`` by more than a tenth, a log is ``named``, and it is the newest.
+    whether the friction that may be counted on ``fell`` by more than a twentieth, a log is ``named``, and it is the
+    newest.
     """
 
     logs: int

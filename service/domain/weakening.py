@@ -20,7 +20,7 @@ def with_weakening(
     logs: Mapping[str, Moments],
     prior: ScatterPrior,
 ) -> list[FrictionModel]:
-    """The models, those marked by which a planner may count on less by more than a tenth than ``before``, by method.
+    """The models, those marked by which a planner may count on less than ``before`` by more than a twentieth.
 
     The mark names the log, of the ``logs`` by id and oldest first, without which most of that is undone. It stays while
     this is so. Only models that separate scatter between grasps are compared, and not with one of a single sensor where

@@ -47,6 +47,12 @@ def test_the_log_is_named_with_what_to_do_while_most_of_the_fall_is_its() -> Non
 def test_a_log_that_agrees_is_not_looked_for() -> None:
     before = fitted(logs([0.0] * 5))
     assert fitted(logs([0.0] * 6), before)[0].notes == ()
+    assert fitted(logs([0.0] * 5 + [-0.03]), before)[0].notes == ()  # a fall by 3.5 %
+
+
+def test_a_log_that_takes_a_fifteenth_is_named() -> None:
+    before = fitted(logs([0.0] * 5))
+    assert fitted(logs([0.0] * 5 + [-0.05]), before)[0].diagnostics[LOG] == "log5"  # a fall by 6.5 %
 
 
 def test_no_log_is_blamed_for_being_the_first_of_another_sensor() -> None:
