@@ -35,13 +35,19 @@ def rock(name: str) -> FrictionSamples:
     return samples_of(time, v, stress * 1e6 * AREA, mu)
 
 
-def bench() -> FrictionSamples:
-    """Sliding parts of the loaded record: the position moves at more than half of its usual speed."""
+def bench(*, from_middle: bool = False) -> FrictionSamples:
+    """Sliding parts of the loaded record: the position moves at more than half of its usual speed.
+
+    ``from_middle``: only the second half of each stroke, well beyond the elastic ramp after a reversal.
+    """
     path = DATA / "friction_bench_200hz" / "test_data_2.txt.gz"
     time, normal, position, friction = np.loadtxt(path, skiprows=1).T
-    v = np.abs(savgol_filter(position, 21, 1, deriv=1, delta=0.005)) * 1e-3
-    loaded = normal > 0.9 * np.median(normal)
+    rate = savgol_filter(position, 21, 1, deriv=1, delta=0.005) * 1e-3
+    v, loaded = np.abs(rate), normal > 0.9 * np.median(normal)
     sliding = loaded & (v > 0.5 * np.median(v[loaded]))
+    if from_middle:
+        middle = 0.5 * (position[loaded].min() + position[loaded].max())
+        sliding &= rate * (position - middle) > 0.0
     mu = np.abs(friction) / np.where(loaded, normal, 1.0)
     return samples_of(time[sliding], v[sliding], normal[sliding] * 1e-6, mu[sliding])
 

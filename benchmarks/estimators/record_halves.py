@@ -1,0 +1,79 @@
+"""What half of a real record says of the other half: `python -m benchmarks.estimators.record_halves [--page FILE]`.
+
+Each public record (benchmarks/estimators/friction_records.py) is cut into blocks of time, of which a random half is
+fitted, each block as a grasp, and the other half is predicted: which part of its samples lies below the 5 %, 50 % and
+95 % quantiles of an element. Rocks slide at micrometres a second, for which the priors of slopes are not made: their
+velocities count in millimetres. Of the bench also the second half of each stroke, where the record has left the elastic
+ramp. Writes record_halves.json.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is first imported: small products gain nothing from threads
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import estimators
+from benchmarks.estimators.friction_records import ROCKS, bench, rock
+from benchmarks.pages import options, table, write
+from slipcore.samples import FrictionSamples
+
+METHODS = ("auto", "hierarchical", "ols", "robust")
+BLOCKS = 40
+QUANTILES = (0.05, 0.5, 0.95)
+COLUMNS = ("record", "blocks", *(f"{method}: below 5, 50, 95 %" for method in METHODS))
+
+
+def records() -> dict[str, FrictionSamples]:
+    """Those of rocks with a thousandfold velocity, and that of the bench whole and in part."""
+    found = {}
+    for name in ROCKS:
+        record = rock(name)
+        found[f"rock gouge, {name}"] = replace(record, tangential_velocity=1e3 * record.tangential_velocity)
+    return {**found, "friction bench": bench(), "friction bench, second half of strokes": bench(from_middle=True)}
+
+
+def blocks_of(record: FrictionSamples, count: int) -> list[FrictionSamples]:
+    """The record in so many stretches of time, each with as many samples."""
+    order = np.argsort(record.time, kind="stable")
+    return [record.take(np.isin(np.arange(len(record)), part)) for part in np.array_split(order, count)]
+
+
+def below(parts: Sequence[FrictionSamples], chosen: NDArray[np.bool_], method: str) -> list[float]:
+    """Part of the samples of the blocks that were not ``chosen`` below each quantile of a fit to those that were."""
+    try:
+        model = estimators.fit([part for part, use in zip(parts, chosen, strict=True) if use], method=method)
+    except estimators.NotConverged as refused:  # an M-estimate of what is half ramp
+        model = refused.model
+    rest = FrictionSamples.concatenate([part for part, use in zip(parts, chosen, strict=True) if not use])
+    v, f_n, mu = rest.tangential_velocity, rest.normal_force, rest.friction_coefficient
+    return [float((mu < model.predict(v, f_n, quantile, of="element")).mean()) for quantile in QUANTILES]
+
+
+def row(name: str, record: FrictionSamples, halves: int) -> list[object]:
+    """Means over random halves of one record, by each method."""
+    rng, parts = np.random.default_rng(0), blocks_of(record, BLOCKS)
+    chosen = [rng.permutation(BLOCKS) < BLOCKS // 2 for _ in range(halves)]
+    found = {method: np.mean([below(parts, each, method) for each in chosen], axis=0) for method in METHODS}
+    return [name, BLOCKS, *(" ".join(f"{part:.3f}" for part in found[method]) for method in METHODS)]
+
+
+def main() -> None:
+    """Run, write and print."""
+    parser = options(__doc__)
+    parser.add_argument("--halves", type=int, default=20)
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    rows = [row(name, record, arguments.halves) for name, record in records().items()]
+    tables = {"record halves": table(COLUMNS, rows)}
+    print(tables["record halves"])
+    write([dict(zip(COLUMNS, each, strict=True)) for each in rows], tables, arguments, "record_halves.json")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""Halves of a record: blocks of time, each of which is fitted or predicted, and how much lies below a quantile."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from benchmarks.estimators.friction_records import DATA, bench, samples_of
+from benchmarks.estimators.record_halves import QUANTILES, below, blocks_of
+
+
+def test_the_quantiles_of_a_record_of_independent_errors_hold_what_they_say() -> None:
+    rng, count = np.random.default_rng(0), 8000
+    v, f_n = rng.uniform(0.0, 5e-3, count), rng.uniform(4.0, 6.0, count)
+    mu = 0.5 + 4.0 * v - 0.01 * f_n + 0.02 * rng.standard_normal(count)
+    parts = blocks_of(samples_of(np.arange(count) / 200.0, v, f_n, mu), 40)
+    assert [len(part) for part in parts] == [200] * 40
+    assert all(before.time.max() < after.time.min() for before, after in pairwise(parts))
+    chosen = rng.permutation(40) < 20
+    for method in ("auto", "ols"):
+        assert below(parts, chosen, method) == pytest.approx(QUANTILES, abs=0.015)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not at hand")
+def test_the_second_half_of_a_stroke_has_left_the_ramp() -> None:
+    whole, part = bench().friction_coefficient, bench(from_middle=True).friction_coefficient
+    assert 0.35 * len(whole) < len(part) < 0.55 * len(whole)
+    assert np.quantile(whole, 0.05) < 0.1
+    assert np.quantile(part, 0.05) > 0.42
