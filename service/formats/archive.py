@@ -25,6 +25,8 @@ _END_OF_DIRECTORY, _ZIP64_LOCATOR, _END_BYTES, _LOCATOR_BYTES = b"PK\x05\x06", b
 _ENCRYPTED = 0x1
 _LOCAL_BYTES, _LOCAL_LENGTHS = 30, 26
 """Bytes of the header before a member, and where in it the lengths of its name and extra field are."""
+_IS_DESCRIBED, _DESCRIPTOR_BYTES = 0x8, (12, 16, 20, 24)
+"""A member that was written as a stream is followed by its lengths, in one of these numbers of bytes."""
 
 
 @contextmanager
@@ -35,6 +37,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         archive = zipfile.ZipFile(path)
     with archive:
         _check_members(archive)
+        with _sound():
+            _check_gaps(archive)
         yield archive
 
 
@@ -72,8 +76,7 @@ class _Stored:
         self._file, self._entry, self._read, self._crc = archive.fp, entry, 0, 0
         if entry.file_size > os.fstat(self._file.fileno()).st_size:
             raise zipfile.BadZipFile(f"{entry.file_size} bytes in {entry.filename!r} by its header")
-        self._file.seek(entry.header_offset + _LOCAL_LENGTHS)
-        self._file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", self._file.read(4))))
+        self._file.seek(_content_offset(archive, entry))
 
     def read(self, size: int = -1, /) -> bytes:
         """The next bytes, fewer at the member's end."""
@@ -90,6 +93,16 @@ class _Stored:
         """Raises ``BadZipFile`` unless what was read is what was written."""
         if self._crc != self._entry.CRC:
             raise zipfile.BadZipFile(f"Bad CRC-32 for file {self._entry.filename!r}")
+
+
+def _content_offset(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> int:
+    """Where in the file a member's content begins, by the header before it."""
+    assert archive.fp is not None
+    archive.fp.seek(entry.header_offset + _LOCAL_LENGTHS)
+    lengths = archive.fp.read(4)
+    if len(lengths) < 4:
+        raise zipfile.BadZipFile(f"no header of {entry.filename!r} where it should be")
+    return entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", lengths))
 
 
 @contextmanager
@@ -110,7 +123,8 @@ def _sound() -> Iterator[None]:
 def _check_directory(path: Path) -> None:
     """Bound the table of contents before ``zipfile`` turns each of its entries into an object.
 
-    What stands before the first member, which ``zipfile`` passes over, is refused: to others the file is no zip.
+    What stands before the first member, which ``zipfile`` passes over, is refused: to others the file is no zip. So is
+    what stands behind the end, and of two zips in one file the first, of which nothing would be read.
     """
     with path.open("rb") as stream:
         start, length = stream.read(len(_MEMBER)), stream.seek(0, 2)
@@ -121,11 +135,16 @@ def _check_directory(path: Path) -> None:
         raise InvalidInput("file", f"not a complete zip ({length} bytes, no table of contents)", "a complete zip")
     if start not in {_MEMBER, _END_OF_DIRECTORY}:
         raise InvalidInput("file", f"a zip behind other bytes (it starts with {start!r})", "nothing before a zip")
-    size = int.from_bytes(tail[end + 12 : end + 16], "little")
+    size, offset, comment = struct.unpack_from("<IIH", tail, end + 12)
     zip64 = tail[max(0, end - _LOCATOR_BYTES) : end].startswith(_ZIP64_LOCATOR)
     if zip64 or size > MAX_DIRECTORY_BYTES:
         value = "in the zip64 layout" if zip64 else f"{size} bytes"
         raise InvalidInput("table of contents", value, f"at most {MAX_DIRECTORY_BYTES} bytes, no zip64")
+    behind, before = len(tail) - (end + _END_BYTES + comment), length - len(tail) + end - (offset + size)
+    if behind > 0:
+        raise InvalidInput("file", f"a zip with {behind} other bytes behind it", "nothing behind a zip")
+    if before > 0:
+        raise InvalidInput("file", f"a zip with {before} bytes that are no part of it", "one zip, and nothing else")
 
 
 def _check_members(archive: zipfile.ZipFile) -> None:
@@ -145,6 +164,19 @@ def _check_members(archive: zipfile.ZipFile) -> None:
     total = sum(entry.file_size for entry in entries)
     if total > MAX_ARRAY_BYTES:
         raise InvalidInput("file", f"{total} bytes unpacked", f"at most {MAX_ARRAY_BYTES} bytes unpacked")
+
+
+def _check_gaps(archive: zipfile.ZipFile) -> None:
+    """Refuse bytes between members, of which nobody would read any, and members that share some."""
+    entries = sorted(archive.infolist(), key=lambda entry: entry.header_offset)
+    begins = [*(entry.header_offset for entry in entries), archive.start_dir]
+    ends = [(0, 0), *((_content_offset(archive, entry) + entry.compress_size, entry.flag_bits) for entry in entries)]
+    for begin, (end, flags) in zip(begins, ends, strict=True):
+        if begin != end and not (flags & _IS_DESCRIBED and begin - end in _DESCRIPTOR_BYTES):
+            value = f"a zip with {begin - end} bytes from {end} on that are no member's"
+            raise InvalidInput(
+                "file", value if begin > end else "a zip of members that overlap", "one member after another"
+            )
 
 
 def _damaged(error: Exception) -> InvalidInput:

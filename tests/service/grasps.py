@@ -1,4 +1,4 @@
-"""Logs of other grasps than a given one, for which nothing is simulated."""
+"""Logs of other grasps than a given one, or of the same in another file, for which nothing is simulated."""
 
 import io
 
@@ -14,3 +14,9 @@ def another_grasp(content: bytes, number: int = 1) -> bytes:
     buffer = io.BytesIO()
     np.savez(buffer, **members | {"force": members["force"] * (1.0 + 1e-6 * number)})
     return buffer.getvalue()
+
+
+def same_grasp(content: bytes, number: int) -> bytes:
+    """The same log in other bytes, of which 0 are its own: a zip ends with a comment, which is empty as yet."""
+    comment = b" " * number
+    return content[:-2] + len(comment).to_bytes(2, "little") + comment

@@ -213,6 +213,61 @@ def test_a_zip_behind_other_bytes_is_refused(log: GraspLog, tmp_path: Path, befo
         npz.read(path)
 
 
+@pytest.mark.parametrize("behind", [b"j", b"junk", bytes(70_000)])
+def test_bytes_behind_a_zip_are_refused(log: GraspLog, tmp_path: Path, behind: bytes) -> None:
+    path = tmp_path / "log.npz"
+    path.write_bytes(container.encode(log) + behind)
+    with pytest.raises(InvalidInput, match=r"other bytes behind it|no table of contents"):
+        npz.read(path)
+
+
+def test_of_two_zips_in_one_file_neither_is_read(log: GraspLog, tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    path.write_bytes(container.encode(log) + container.encode(replace(log, sensor="another")))
+    with pytest.raises(InvalidInput, match="bytes that are no part of it"):
+        npz.read(path)
+
+
+@pytest.mark.parametrize("member", ["time.npy", "displacement.npy"])
+def test_bytes_between_members_are_refused(log: GraspLog, tmp_path: Path, member: str) -> None:
+    path = container.write(log, tmp_path / "log.npz")
+    with zipfile.ZipFile(path) as archive:
+        place = archive.getinfo(member).header_offset
+        offsets = {entry.filename: entry.header_offset for entry in archive.infolist()}
+    content, hidden = bytearray(path.read_bytes()), b"hidden"
+    end = content.rfind(b"PK\x05\x06")
+    directory = struct.unpack_from("<I", content, end + 16)[0]
+    struct.pack_into("<I", content, end + 16, directory + len(hidden))
+    entry = directory
+    for offset in offsets.values():  # in the table of contents, each entry's place is 42 bytes behind its begin
+        if offset >= place:
+            struct.pack_into("<I", content, entry + 42, offset + len(hidden))
+        entry += 46 + sum(struct.unpack_from("<HHH", content, entry + 28))
+    path.write_bytes(content[:place] + hidden + content[place:])
+    with pytest.raises(InvalidInput, match=r"6 bytes from \d+ on that are no member's|behind other bytes"):
+        npz.read(path)
+
+
+def test_members_that_were_written_as_a_stream_are_read(log: GraspLog, tmp_path: Path) -> None:
+    class Stream(io.RawIOBase):
+        def __init__(self) -> None:
+            self.content = bytearray()
+
+        def writable(self) -> bool:
+            return True
+
+        def write(self, content: Any, /) -> int:
+            self.content += content
+            return len(content)
+
+    stream, path = Stream(), tmp_path / "log.npz"
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
+        for name, content in members(log).items():
+            archive.writestr(name, content)
+    path.write_bytes(stream.content)
+    np.testing.assert_array_equal(npz.read(path).time, log.time)
+
+
 @pytest.mark.parametrize(
     "name", ["../time.npy", "/time.npy", "a/../time.npy", "C:time.npy", "a\\time.npy", "./time.npy"]
 )

@@ -23,7 +23,7 @@ from db.repositories import jobs, runners
 from db.tables import Base, FrictionModelRow, GraspLogRow, JobRow
 from service.jobs import worker
 from slipcore import GraspLog
-from tests.service.grasps import another_grasp
+from tests.service.grasps import another_grasp, same_grasp
 
 FAULTS = ("EIO", "ENOSPC", "short write")
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
@@ -76,7 +76,7 @@ def test_an_upload_is_stored_as_a_whole_or_refused(
         return answer
 
     for at in each_point(layer, fault):
-        body = content + b"\0" * at  # another log each time
+        body = same_grasp(content, at)  # another log each time
         answer = send(body)
         point = layer.disarm()
         layer.fired = point
@@ -127,7 +127,7 @@ def test_a_job_stores_its_results_once_and_whole(
         layer.disarm()
         query = {"material": "paper"}
         body = another_grasp(content, at // 2 + 1)  # every second one is a copy, which does not count
-        body += b"\0" * (at % 2)
+        body = same_grasp(body, at % 2)
         log = caller.request("POST", "/v1/grasp-logs", params=query, content=body, headers=NPZ).json()
         claimed = claim()
         layer.arm(at, fault)
@@ -191,7 +191,7 @@ def migrated_at_once(layer: Any, sqlite_template: Path, monkeypatch: pytest.Monk
 def filled(reach: Callable[..., Any], database: Database, blobs: BlobStore, content: bytes) -> Database:
     caller = reach("open")
     for number in range(2):
-        caller.request("POST", "/v1/grasp-logs", content=content + b"\0" * number, headers=NPZ).raise_for_status()
+        caller.request("POST", "/v1/grasp-logs", content=same_grasp(content, number), headers=NPZ).raise_for_status()
     assert len(list(blobs.hashes())) == 2
     return database
 

@@ -37,7 +37,7 @@ from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
 from stiction_client.container import encode
-from tests.service.grasps import another_grasp
+from tests.service.grasps import another_grasp, same_grasp
 from tests.service.remembered import remembering
 
 RunWith = Callable[[Callable[[Session], object]], Job]
@@ -179,7 +179,9 @@ def test_a_grasp_that_was_sent_in_several_files_counts_once(shop: Shop, content:
     shop.run(shop.ingest(content)[1])
     alone = hierarchical_model(shop).model
     later, bare = encode(replace(ramp, time=ramp.time + 1000.0)), encode(replace(ramp, truth=None, sensor="other"))
-    copies = [shop.ingest(each, sensor) for each, sensor in ((content + b"\0", "s"), (later, "s"), (bare, "other"))]
+    copies = [
+        shop.ingest(each, sensor) for each, sensor in ((same_grasp(content, 1), "s"), (later, "s"), (bare, "other"))
+    ]
     assert [shop.run(job).status for _, job in copies] == ["done"] * 3
     stored = hierarchical_model(shop)
     assert (stored.model.coefficients, stored.model.n) == (alone.coefficients, alone.n)
@@ -644,6 +646,14 @@ def test_a_gripper_that_reports_its_force_is_named_beside_the_gel(shop: Shop, bl
         "by the sensor's gel and from the normal force that the gripper reports, in effect averaged" in told_by.evidence
     )
     assert contradicted.name == "gripper's force contradicted"  # it is by far too small
+
+
+def test_a_log_that_calls_its_forces_reconstructed_silences_no_check_without_a_word(shop: Shop, ramp: GraspLog) -> None:
+    log_id, job_id = shop.ingest(encode(replace(ramp, metadata={"force": "reconstructed"})))
+    shop.run(job_id)
+    found = shop.log(log_id).detection
+    assert found is not None
+    assert "forces not checked" in {finding.name for finding in found.findings or ()}
 
 
 def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop: Shop, blind: GraspLog) -> None:

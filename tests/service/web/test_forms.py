@@ -12,6 +12,7 @@ import httpx
 import numpy as np
 import pytest
 from starlette.datastructures import UploadFile
+from starlette.formparsers import MultiPartParser
 
 from estimators.method_names import METHODS
 from service.domain import upload
@@ -19,6 +20,8 @@ from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
 from service.web import forms
 from service.web.routes.planning import further_warning
+from slipcore import GraspLog
+from stiction_client import container
 from tests.service.web.conftest import HOSTILE, HTML, OWN
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -73,6 +76,17 @@ def test_a_refused_upload_is_told_above_its_form(
     assert "<details open>" in answer.text  # where a format or a mapping can be given
     kept = {name: text for name, text in data.items() if name in {"scale"}}
     assert all(f'value="{text}"' in answer.text for text in kept.values())
+
+
+@ON_SQLITE
+def test_a_field_that_is_sent_twice_is_refused_by_name(client: httpx.Client, content: bytes) -> None:
+    """The last scale had counted, without a word."""
+    files = {"file": ("grasp.npz", content)}
+    answer = client.post("/upload", data={"scale": ["1e-4", "2e-4"]}, files=files, headers=HTML)
+    assert answer.status_code == 400
+    assert "the form has the field scale 2 times" in answer.text
+    answer = client.post("/materials", data={"name": ["cork", "felt"]}, headers=HTML)
+    assert (answer.status_code, "the field name 2 times" in answer.text) == (400, True)
 
 
 @ON_SQLITE
@@ -280,11 +294,15 @@ def test_a_form_without_a_file_is_not_read_beyond_its_bound(browser: Any, path: 
 
 @ON_SQLITE
 def test_the_file_of_a_form_is_written_beside_the_blobs_only(
-    browser: Any, content: bytes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    browser: Any, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Where there is room for it, and nobody else may read."""
+    displacement = np.tile(ramp.displacement, (8, 1, 1, 1))
+    time = (ramp.time[1] - ramp.time[0]) * np.arange(len(displacement))
+    content = container.encode(GraspLog(time, ramp.position, displacement, ramp.element_area))
+    assert len(content) > MultiPartParser.spool_max_size
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    answer = browser.request("POST", "/upload", files={"file": ("log.npz", content * 8)}, headers=OWN)
+    answer = browser.request("POST", "/upload", files={"file": ("log.npz", content)}, headers=OWN)
     assert answer.status_code == 303, answer.text
 
 
