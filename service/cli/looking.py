@@ -47,7 +47,7 @@ class InspectedLog:
         from service.domain.reconstruct import reconstruction_findings
         from slipcore import check_log
 
-        return [*reconstruction_findings(self.reconstruction), *check_log(self.log, self.history)]
+        return [*reconstruction_findings(self.log, self.reconstruction), *check_log(self.log, self.history)]
 
 
 def look(
@@ -107,12 +107,6 @@ def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstr
 
 
 def _read_json(path: Path, name: str) -> Mapping[str, Any]:
-    from json import loads
+    from service.formats.json_text import parse_object
 
-    from slipcore import InvalidInput
-
-    try:
-        told: Mapping[str, Any] = loads(path.read_bytes())
-    except ValueError as error:
-        raise InvalidInput(name, f"{path.name}, no JSON ({error})", "a JSON file") from error
-    return told
+    return parse_object(name, path.read_bytes())

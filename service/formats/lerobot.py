@@ -1,6 +1,5 @@
 """A LeRobot data set (v3.0) as a folder: its episodes, and which of its files each is in (docs/formats.md)."""
 
-import json
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from service.formats import LEROBOT_INFO
+from service.formats.json_text import parse_object
 from service.formats.mapping import UNMAPPED, FieldMapping
 from slipcore.errors import InvalidInput
 
@@ -67,7 +67,7 @@ def _not_one(mapping: FieldMapping, found: list[Episode]) -> InvalidInput:
 
 def _info(folder: Path) -> dict[str, Any]:
     try:
-        info = json.loads((folder / LEROBOT_INFO).read_text(encoding="utf-8"))
+        info = parse_object(LEROBOT_INFO, (folder / LEROBOT_INFO).read_text(encoding="utf-8"))
         version, features = str(info["codebase_version"]), info["features"]
         {name: feature["shape"] for name, feature in features.items()}
         told = {"features": features, "data_path": str(info["data_path"])}

@@ -122,6 +122,7 @@ def read_header(lines: Iterator[str]) -> Header:
         text = line.strip("\ufeff \r\n")
         if text.startswith("#"):
             name, _, value = (part.strip() for part in text[1:].partition(":"))
+            name = name.lower()
             if name in settings:
                 raise RepeatedSetting(f"line {number}, {name}", "a second time", "each setting once")
             if name in SETTINGS:

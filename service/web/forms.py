@@ -1,5 +1,6 @@
 """What forms send: text for everything, and nothing for what was left empty."""
 
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from typing import IO, Any, TypeVar
 from urllib.parse import parse_qsl
@@ -15,7 +16,7 @@ from starlette.requests import ClientDisconnect
 
 from db.text import is_storable
 from service.domain.context import Context
-from service.domain.errors import UploadInterrupted
+from service.domain.errors import UploadInterrupted, shown
 from service.http.bodies import MOST_FIELDS, limited, media_type
 from service.http.fair_route import FairRoute
 
@@ -72,9 +73,18 @@ class _FormRequest(Request):
 def _fields(body: bytes) -> FormData:
     try:
         text = body.decode("latin-1")  # the names and values are in UTF-8, by escapes
-        return FormData([*parse_qsl(text, keep_blank_values=True, errors="replace", max_num_fields=MOST_FIELDS)])
+        form = FormData([*parse_qsl(text, keep_blank_values=True, errors="replace", max_num_fields=MOST_FIELDS)])
     except ValueError as error:
         raise HTTPException(400, f"the form has more than {MOST_FIELDS} fields") from error
+    _check_once(form)
+    return form
+
+
+def _check_once(form: FormData) -> None:
+    """Raise ``HTTPException`` for a field that is there twice: of two scales the last would count, without a word."""
+    name, times = Counter(name for name, _ in form.multi_items()).most_common(1)[0] if form else ("", 0)
+    if times > 1:
+        raise HTTPException(400, f"the form has the field {shown(name)} {times} times; allowed: once")
 
 
 class _FileParser(MultiPartParser):
@@ -110,6 +120,11 @@ async def read_form(request: Request, make_file: Callable[[], IO[bytes]], **most
         raise UploadInterrupted("the connection ended before the form did") from error
     except UnicodeError as error:
         raise HTTPException(400, NOT_UTF_8) from error
+    try:
+        _check_once(form)
+    except HTTPException:
+        await form.close()
+        raise
     sent = (text for pair in form.multi_items() for text in pair)
     texts = (each if isinstance(each, str) else each.filename or "" for each in sent)
     if not all(map(is_storable, texts)):

@@ -862,7 +862,7 @@ def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(
     assert "gel.json: slip and friction are by the log's own forces" in run("detect", felt, "--gel", gel)[2]
     code, _, err = run("check", felt, "--gel", felt)
     assert code == INPUT_REFUSED
-    assert "gel is felt.npz, no JSON" in err
+    assert "gel is not JSON" in err
 
 
 def test_forces_do_not_follow_from_what_tells_no_displacement_in_metres(

@@ -167,6 +167,13 @@ def test_a_damaged_data_set_is_refused_by_the_file_that_is(folder: Path, name: s
         formats.read(folder, mapping='{"episode": 0}')
 
 
+def test_a_description_with_an_entry_twice_is_refused(folder: Path) -> None:
+    path = folder / "meta/info.json"
+    path.write_text(path.read_text().replace("{", '{"data_path": "elsewhere", ', 1))
+    with pytest.raises(InvalidInput, match="the key 'data_path' more than once"):
+        formats.episodes_of(folder)
+
+
 @pytest.mark.parametrize("entries", [{"features": None}, {"features": {"a": 1}}])
 def test_a_description_of_something_else_is_refused(folder: Path, entries: dict[str, Any]) -> None:
     change(folder, **entries)

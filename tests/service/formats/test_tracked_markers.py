@@ -135,10 +135,11 @@ def test_a_column_is_the_grippers_force(write: Write, rows: str) -> None:
     np.testing.assert_array_equal(log.gripper_force, [0.0, 1.5, 3.0])
 
 
-def test_a_setting_that_stands_twice_is_refused(write: Write) -> None:
+@pytest.mark.parametrize("again", ["scale", "Scale", " SCALE "])
+def test_a_setting_that_stands_twice_is_refused(write: Write, again: str) -> None:
     """The first had counted."""
     with pytest.raises(InvalidInput, match="line 2, scale is a second time; allowed: each setting once"):
-        formats.read(write(table(head="# scale: 2e-4\n# scale: 1e-4\n")))
+        formats.read(write(table(head=f"# scale: 2e-4\n#{again}: 1e-4\n")))
 
 
 def test_an_unknown_scale_is_told_and_friction_refused(write: Write) -> None:
