@@ -9,6 +9,7 @@ Severity = Literal["warning", "note"]
 SEVERITIES: dict[str, Severity] = {
     "reconstructed forces": "note",
     "gripper's force contradicted": "note",
+    "forces not checked": "note",
     "same grasp": "note",
     "slow frames": "note",
     "no displacement": "note",

@@ -71,6 +71,9 @@ class GroundTruth:
 NONE = "none"
 """In a log's metadata, for what its sensor does not measure."""
 
+RECONSTRUCTED = "reconstructed"
+"""There, for forces that follow from displacement."""
+
 UNNAMED = "unknown"
 """The sensor of logs that name none."""
 
@@ -160,6 +163,11 @@ class GraspLog:
     def has_displacement(self) -> bool:
         """Whether displacement was measured; False where the metadata say that there are forces alone."""
         return self.metadata.get("displacement") != NONE
+
+    @property
+    def has_reconstructed_force(self) -> bool:
+        """Whether the metadata say that forces follow from displacement, as those of ``Reconstruction.apply`` do."""
+        return self.force is not None and self.metadata.get("force") == RECONSTRUCTED
 
     def __len__(self) -> int:
         return len(self.time)

@@ -34,12 +34,22 @@ def with_forces(log: "GraspLog", gel: Mapping[str, float | None]) -> "tuple[Gras
     return found.apply(log), found
 
 
-def reconstruction_findings(reconstruction: "Reconstruction | None") -> "list[Finding]":
-    """That forces are reconstructed, and how well they are known; nothing where they are the sensor's."""
-    if reconstruction is None:
-        return []
+def reconstruction_findings(log: "GraspLog", reconstruction: "Reconstruction | None") -> "list[Finding]":
+    """That forces are reconstructed, and how well they are known; nothing where they are the sensor's.
+
+    A log's own metadata may say so of the forces in it: then what was not checked is told.
+    """
     from slipcore import Finding
 
+    if reconstruction is None:
+        if not log.has_reconstructed_force:
+            return []
+        evidence = (
+            "by the log's own metadata its forces follow from displacement: zero, frame and range were not checked"
+        )
+        return [
+            Finding("forces not checked", evidence, "leave out `force` of the metadata where a sensor measured them")
+        ]
     shares = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "

@@ -169,7 +169,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
-        findings = [*same_grasp(others), *reconstruction_findings(reconstruction), *findings]
+        findings = [*same_grasp(others), *reconstruction_findings(log, reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled

@@ -110,4 +110,4 @@ def _line(moved: ComplexArray, ratio: ComplexArray) -> tuple[tuple[complex, comp
 
 def _measured(seen: Subject) -> FloatArray | None:
     """Forces that a sensor measured; those that follow from the markers contradict them in nothing."""
-    return None if seen.log.metadata.get("force") == "reconstructed" else seen.log.force
+    return None if seen.log.has_reconstructed_force else seen.log.force

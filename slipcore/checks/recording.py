@@ -87,7 +87,7 @@ def force_sign(seen: Subject) -> Iterator[Finding]:
 
 def saturation(seen: Subject) -> Iterator[Finding]:
     """Readings at the end of their range."""
-    measured = None if seen.log.metadata.get("force") == "reconstructed" else seen.log.force
+    measured = None if seen.log.has_reconstructed_force else seen.log.force
     contact = seen.history.contact
     touched = int(np.count_nonzero(contact.any(axis=0)))
     for name, field in (("displacement", seen.log.displacement), ("force", measured)):

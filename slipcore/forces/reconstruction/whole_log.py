@@ -16,7 +16,7 @@ from slipcore.forces.tracking.frame_forces import FrameForces, Reader
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
-from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.frames import RECONSTRUCTED, BoolArray, FloatArray, GraspLog
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class Reconstruction:
         if self.force.shape != log.displacement.shape:
             raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
-        return replace(log, force=self.force, normal=normal, metadata={**log.metadata, "force": "reconstructed"})
+        return replace(log, force=self.force, normal=normal, metadata={**log.metadata, "force": RECONSTRUCTED})
 
     @property
     def force_noise(self) -> float:
