@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 JobKind = Literal["ingest", "fit"]
 JobStatus = Literal["queued", "running", "done", "failed", "refused", "cancelled"]
@@ -275,6 +275,13 @@ class Detection:
     corrections: tuple[str, ...] | None = None
     gel: Gel | None = None
     fingerprint: str | None = None
+
+
+class Signature(NamedTuple):
+    """By which the grasp of a log is known again, and the fingerprint that all logs of that grasp have."""
+
+    fingerprint: str
+    content: bytes
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,20 +1,25 @@
 """Queries on what was found in a log: detection and samples, stored together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
+from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import ColumnElement, Row, Select, delete, select, update
 from sqlalchemy.orm import Session
 
-from db.records import ContactFriction, Detection, Finding, Gel, SampledLog, SamplesOfLog, SampleSummary
+from db.records import ContactFriction, Detection, Finding, Gel, SampledLog, SamplesOfLog, SampleSummary, Signature
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow, SensorRow
 
+EVER = datetime(1970, 1, 1, tzinfo=UTC)
 
-def add(session: Session, log_id: str, detection: Detection, samples: SampleSummary) -> None:
-    """Store what was found in a log."""
+
+def add(
+    session: Session, log_id: str, detection: Detection, samples: SampleSummary, signature: bytes | None = None
+) -> None:
+    """Store what was found in a log, with that by which its grasp is known again in a cut or rounded log."""
     velocity, force = samples.tangential_velocity or (None, None), samples.normal_force or (None, None)
-    session.add(DetectionRow(grasp_log_id=log_id, **asdict(detection)))
+    session.add(DetectionRow(grasp_log_id=log_id, **asdict(detection), signature=signature))
     session.add(
         SampleSummaryRow(
             grasp_log_id=log_id,
@@ -67,6 +72,23 @@ def others_of_grasp(session: Session, log_id: str, fingerprint: str) -> list[str
     same = (DetectionRow.fingerprint == fingerprint, GraspLogRow.sha256 != sha256)
     ordered = query.where(*_that_count(material_id), *same).order_by(GraspLogRow.created_at, GraspLogRow.id)
     return list(session.scalars(ordered))
+
+
+def signatures(session: Session, log_id: str, most: int, since: datetime = EVER) -> Iterator[Signature]:
+    """Those of other logs of its material, withdrawn ones too, newest first, ``most`` of them, one at a time, that
+    were stored ``since`` then.
+    """
+    own = select(GraspLogRow.material_id, GraspLogRow.sha256).where(GraspLogRow.id == log_id)
+    material_id, sha256 = session.execute(own).one()
+    if material_id is None:
+        return
+    query = select(DetectionRow.fingerprint, DetectionRow.signature).join(GraspLogRow)
+    of_others = (GraspLogRow.material_id == material_id, GraspLogRow.sha256 != sha256)
+    with_one = query.where(*of_others, DetectionRow.signature.is_not(None), DetectionRow.created_at >= since)
+    ordered = with_one.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)
+    with session.execute(ordered.execution_options(yield_per=10)) as rows:  # which may be left before their end
+        for row in rows:
+            yield Signature(*row)
 
 
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:

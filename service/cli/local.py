@@ -125,12 +125,21 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service.domain.doubtful_logs import with_doubts
-    from service.domain.same_grasp import fingerprint, same_grasp
+    from service.domain.same_grasp import fingerprint, is_alike, same_grasp, signature
+
+    known = list[tuple[str, bytes]]()
+
+    def grasp_of(log: "GraspLog") -> str:
+        """The fingerprint of the first log of the same grasp."""
+        own, content = fingerprint(log), signature(log)
+        grasp = next((first for first, other in known if first == own or is_alike(content, other)), own)
+        known.append((grasp, content))
+        return grasp
 
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
         log = read_log(path, mapping)
         seen = look(log, detector, sensor_model, gel)
-        return fingerprint(log), seen.samples(), seen.findings()
+        return grasp_of(log), seen.samples(), seen.findings()
 
     first = dict[str, Path]()
     seen: list[tuple[FrictionSamples, list[Finding]]] = []

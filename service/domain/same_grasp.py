@@ -1,7 +1,7 @@
 """One grasp that was sent in several files: how it is known again, and what is said of it."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,12 +10,36 @@ import numpy as np
 from stiction_client.support import SAME_GRASPS
 
 if TYPE_CHECKING:
-    from db.records import SamplesOfLog
+    from db.records import SamplesOfLog, Signature
     from estimators import FrictionModel
     from slipcore import Finding, GraspLog
+    from slipcore.frames import FloatArray
 
 FRAMES = 1000
 """Hashed at once, so that no copy of a whole log is made."""
+
+SUMS = 8
+"""Sums of a frame's readings, each with signs of its own, that are kept of it: 32 bytes."""
+
+MOST_FRAMES = 20_000
+"""Of a log, whose sums are kept: its first ones."""
+
+MOST_LOGS, MOST_COMPARED = 1000, 1_000_000
+"""Logs of a material, the newest, and frames of all of them, with which a new one is compared: a second at most."""
+
+ASKED = 64
+"""Frames of a log, among those with more than half of its largest load, that are looked for in another."""
+
+SHARED = 0.75
+"""-, of these frames that another log has, from which on both are of one grasp."""
+
+NOISE_SHARE = 0.3
+"""-, of the noise of a sum, within which it is the same reading: of two frames of equal load in different grasps all
+sums are as near in 6 of 10⁷ pairs.
+"""
+
+DIGITS = 5e-4
+"""-, of the largest sum, within which it is the same whatever the noise: readings were rounded."""
 
 TOLD = 5
 """Copies that a note names; of more it says how many there are."""
@@ -36,13 +60,79 @@ def fingerprint(log: "GraspLog") -> str:
     return digest.hexdigest()
 
 
+def signature(log: "GraspLog") -> bytes:
+    """By which the same measurements are known again in a log that was cut, rounded or scaled by a little.
+
+    Sums of the readings of each frame, with signs that are drawn once for all: noise makes them differ from grasp to
+    grasp, and rounding changes them by far less than noise does. ``is_alike`` compares them.
+    """
+    measured = log.displacement if log.force is None else log.force
+    signs = _signs(measured[0].size)
+    kept = min(len(measured), MOST_FRAMES)
+    parts = (measured[begin : min(begin + FRAMES, kept)] for begin in range(0, kept, FRAMES))
+    sums = np.concatenate([part.reshape(len(part), -1) @ signs for part in parts])
+    return bytes(sums.astype("<f4").tobytes())
+
+
+def find_alike(own: bytes, others: "Iterable[Signature]") -> "Signature | None":
+    """The first of the others that is of the same grasp, as far as they are compared."""
+    compared = 0
+    for other in others:
+        compared += len(other.content) // (4 * SUMS)
+        if compared > MOST_COMPARED:
+            return None
+        if is_alike(own, other.content):
+            return other
+    return None
+
+
+def is_alike(one: bytes, other: bytes) -> bool:
+    """Whether these signatures are of one grasp: most frames under load of one of the logs are in the other, too."""
+    sums = [np.frombuffer(each, "<f4").reshape(-1, SUMS).astype(float) for each in (one, other)]
+    within = NOISE_SHARE * np.minimum(*map(_noise, sums))
+    within = np.maximum(within, DIGITS * max(float(np.abs(each).max(initial=0.0)) for each in sums))
+    if not within.all():
+        return False
+    frames, others = (each / within for each in sums)
+    return max(_shared(frames, others), _shared(others, frames)) >= SHARED
+
+
+def _signs(readings: int) -> "FloatArray":
+    """Of each reading in each sum, [readings, SUMS], 1 or -1: the same in every version."""
+    drawn = hashlib.shake_256(b"stiction").digest(readings * SUMS // 8)
+    return 2.0 * np.unpackbits(np.frombuffer(drawn, np.uint8)).reshape(readings, SUMS) - 1.0
+
+
+def _noise(sums: "FloatArray") -> "FloatArray":
+    """Standard deviation of each sum [SUMS] from frame to frame, by second differences; 0 of less than three frames."""
+    if len(sums) < 3:
+        return np.zeros(SUMS)
+    return np.asarray(1.4826 * np.median(np.abs(np.diff(sums, 2, axis=0)), axis=0) / np.sqrt(6.0))
+
+
+def _shared(frames: "FloatArray", others: "FloatArray") -> float:
+    """Share of the frames under load [t, SUMS] that are among the others, where 1 is as far as they may be off."""
+    from scipy.spatial import cKDTree
+
+    load = np.linalg.norm(frames, axis=1)
+    loaded = np.flatnonzero(load > 0.5 * load.max(initial=0.0))
+    if not loaded.size:
+        return 0.0
+    asked = frames[loaded[np.unique(np.linspace(0, len(loaded) - 1, ASKED).astype(int))]]
+    distance = cKDTree(others).query(asked, p=np.inf, distance_upper_bound=1.0)[0]
+    return float(np.isfinite(distance).mean())
+
+
 def same_grasp(others: Sequence[str]) -> "list[Finding]":
-    """That a log has the same measurements as ``others``, by their ids, where there are any."""
+    """That a log is of the same grasp as ``others``, by their ids, where there are any."""
     from slipcore import Finding
 
     if not others:
         return []
-    evidence = f"the measurements are those of log {others[0]}: of such logs of a material the first alone counts"
+    evidence = (
+        f"the measurements are those of log {others[0]}, whole, cut or rounded: of such logs of a material the first "
+        "alone counts"
+    )
     return [Finding("same grasp", evidence, REMEDY)]
 
 

@@ -102,7 +102,8 @@ def _content_offset(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> int:
     lengths = archive.fp.read(4)
     if len(lengths) < 4:
         raise zipfile.BadZipFile(f"no header of {entry.filename!r} where it should be")
-    return entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", lengths))
+    name, extra = struct.unpack("<HH", lengths)
+    return int(entry.header_offset + _LOCAL_BYTES + name + extra)
 
 
 @contextmanager

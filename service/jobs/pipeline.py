@@ -9,6 +9,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime, timedelta
 from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -30,7 +31,7 @@ from service.domain.doubtful_logs import with_doubts, with_unchecked
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
-from service.domain.same_grasp import fingerprint, same_grasp, with_copies
+from service.domain.same_grasp import MOST_LOGS, find_alike, fingerprint, same_grasp, signature, with_copies
 from service.domain.sensors import grasping
 from service.domain.stored_results import (
     decode_samples,
@@ -50,6 +51,9 @@ if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
 
 logger = logging.getLogger(__name__)
+
+OVERLAP = timedelta(minutes=1)
+"""By which the clocks of two workers may differ that store logs of one grasp at once."""
 
 FITS_BESIDE_OTHERS = 3
 """Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
@@ -152,12 +156,15 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         stored = grasp_logs.get(session, log_id)
     if stored.samples is not None:
         return stored.samples
+    began = datetime.now(UTC)
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
         if log.sensor != stored.sensor:  # it was named beside the file
             log = replace(log, sensor=stored.sensor)
-        mark = fingerprint(log)
+        mark, own = fingerprint(log), signature(log)
     with run.database.read() as session:
+        alike = find_alike(own, detections.signatures(session, log_id, MOST_LOGS))
+        mark = alike.fingerprint if alike else mark
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
         gel = sensors.get(session, stored.sensor).gel
         others = detections.others_of_grasp(session, log_id, mark)
@@ -180,7 +187,9 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.database.write() as session:
         materials_of_logs.hold(session, log_id)
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
-        detections.add(session, log_id, detection, summary)
+        late = find_alike(own, detections.signatures(session, log_id, MOST_LOGS, since=began - OVERLAP))
+        detection = replace(detection, fingerprint=late.fingerprint) if late else detection
+        detections.add(session, log_id, detection, summary, own)
         jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
     return summary
 

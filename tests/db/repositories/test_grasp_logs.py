@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import event, func, select
@@ -7,7 +8,7 @@ from sqlalchemy import event, func, select
 from db.database import Database
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window
-from db.records import Detection, LogFilter, NewGraspLog, SampleSummary
+from db.records import Detection, LogFilter, NewGraspLog, SampleSummary, Signature
 from db.repositories import blobs, detections, grasp_logs, jobs, materials
 from db.tables import SampleSummaryRow, SensorRow
 
@@ -149,6 +150,25 @@ def test_logs_without_a_material_are_no_copies_of_each_other(
     with database.write() as session:
         detections.add(session, first, replace(detection, fingerprint="1" * 64), samples)
         assert detections.others_of_grasp(session, second, "1" * 64) == []
+
+
+def test_signatures_of_the_other_logs_of_a_material_come_newest_first(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    with database.write() as session:
+        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
+    ids = [add(database, new_log(material)) for material in (paper, paper, steel, paper, paper)]
+    unassigned, began = add(database, new_log()), datetime.now(UTC)
+    with database.write() as session:
+        for number, log_id in enumerate(ids[:-1]):
+            print_ = replace(detection, fingerprint=str(number) * 64)
+            detections.add(session, log_id, print_, samples, None if number == 1 else b"%d" % number)
+        found = list(detections.signatures(session, ids[-1], 9))
+        assert found == [Signature("3" * 64, b"3"), Signature("0" * 64, b"0")]
+        assert list(detections.signatures(session, ids[-1], 1)) == found[:1]
+        assert list(detections.signatures(session, ids[0], 9)) == found[:1]
+        assert list(detections.signatures(session, ids[-1], 9, since=began + timedelta(minutes=1))) == []
+        assert list(detections.signatures(session, unassigned, 9)) == []
 
 
 @pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)

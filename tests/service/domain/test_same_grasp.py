@@ -1,12 +1,13 @@
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import estimators
-from db.records import SamplesOfLog
+from db.records import SamplesOfLog, Signature
 from service.domain import same_grasp
-from service.domain.same_grasp import fingerprint, with_copies
+from service.domain.same_grasp import find_alike, fingerprint, is_alike, signature, with_copies
 from slipcore import GraspLog
 from slipcore.samples import FrictionSamples
 from stiction_client.support import notes
@@ -45,6 +46,64 @@ def test_without_forces_displacements_are_compared(ramp: GraspLog) -> None:
     bare = replace(ramp, force=None)
     assert fingerprint(replace(bare, time=ramp.time + 1.0)) == fingerprint(bare) != fingerprint(ramp)
     assert fingerprint(replace(bare, displacement=1.001 * ramp.displacement)) != fingerprint(bare)
+
+
+def noisy(ramp: GraspLog, seed: int, noise: float = 1e-3) -> GraspLog:
+    """The same grasp as another recording of it would show it, with noise of so many N."""
+    assert ramp.force is not None
+    return replace(ramp, force=ramp.force + np.random.default_rng(seed).normal(0.0, noise, ramp.force.shape))
+
+
+def alike(one: GraspLog, other: GraspLog) -> bool:
+    found = is_alike(signature(one), signature(other))
+    assert is_alike(signature(other), signature(one)) == found
+    return found
+
+
+CHANGES: dict[str, Callable[[GraspLog], GraspLog]] = {
+    "without its last frame": lambda log: log.take(slice(-1)),
+    "without its first frame": lambda log: log.take(slice(1, None)),
+    "its first half": lambda log: log.take(slice(len(log) // 2)),
+    "every second frame": lambda log: log.take(slice(None, None, 2)),
+    "with fewer digits": lambda log: replace(log, force=np.round(np.asarray(log.force), 4)),
+    "in half precision": lambda log: replace(log, force=np.asarray(log.force).astype(np.float16)),
+    "scaled by a little": lambda log: replace(log, force=1.00005 * np.asarray(log.force)),
+    "with little noise": lambda log: noisy(log, 9, 1e-6),
+    "later": lambda log: replace(log, time=log.time + 100.0),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_log_that_was_cut_or_rounded_is_of_the_same_grasp(ramp: GraspLog, change: str) -> None:
+    log = noisy(ramp, 1)
+    assert alike(log, CHANGES[change](log))
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3, 1e-2])
+def test_the_same_grasp_once_more_is_another(ramp: GraspLog, noise: float) -> None:
+    """Noise alone tells them apart."""
+    assert not alike(noisy(ramp, 1, noise), noisy(ramp, 2, noise))
+
+
+def test_without_forces_displacements_are_looked_for(ramp: GraspLog) -> None:
+    bare = replace(ramp, force=None)
+    assert alike(bare, bare.take(slice(3, -3)))
+    assert not alike(bare, ramp)
+
+
+@pytest.mark.parametrize("frames", [2, 5])
+def test_frames_without_any_load_are_no_grasp(ramp: GraspLog, frames: int) -> None:
+    rest = replace(ramp, force=0.0 * np.asarray(ramp.force)).take(slice(frames))
+    assert not alike(rest, rest)
+    assert not alike(rest, ramp)
+
+
+def test_no_more_frames_are_compared_than_a_second_allows(ramp: GraspLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = signature(ramp)
+    known = [Signature("a", signature(noisy(ramp, 1))), Signature("b", own)]
+    assert find_alike(own, known) == known[1]
+    monkeypatch.setattr(same_grasp, "MOST_COMPARED", 2 * len(ramp) - 1)
+    assert find_alike(own, known) is None
 
 
 def test_a_note_names_the_copies_and_what_to_do() -> None:

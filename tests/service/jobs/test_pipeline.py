@@ -178,22 +178,46 @@ def test_a_grasp_that_was_sent_in_several_files_counts_once(shop: Shop, content:
     """Four files of one grasp had been four grasps, which seemed to agree as no grasps do."""
     shop.run(shop.ingest(content)[1])
     alone = hierarchical_model(shop).model
-    later, bare = encode(replace(ramp, time=ramp.time + 1000.0)), encode(replace(ramp, truth=None, sensor="other"))
-    copies = [
-        shop.ingest(each, sensor) for each, sensor in ((same_grasp(content, 1), "s"), (later, "s"), (bare, "other"))
-    ]
-    assert [shop.run(job).status for _, job in copies] == ["done"] * 3
+    assert ramp.force is not None
+    changed = (
+        replace(ramp, time=ramp.time + 1000.0),
+        replace(ramp, truth=None, sensor="other"),
+        ramp.take(slice(-1)),
+        replace(ramp, force=np.round(ramp.force, 6)),
+    )
+    contents = [(same_grasp(content, 1), "s"), *((encode(log), log.sensor) for log in changed)]
+    copies = [shop.ingest(*each) for each in contents]
+    assert [shop.run(job).status for _, job in copies] == ["done"] * 5
     stored = hierarchical_model(shop)
     assert (stored.model.coefficients, stored.model.n) == (alone.coefficients, alone.n)
     known = KnownModel(stored, to_friction_model(stored.model), "", 0.0, 0.0)
     (note,) = look_up(known, FrictionQuery(0.0, 0.05, 0.01)).notes
-    assert note.startswith("3 logs repeat the measurements of another log: counted once (")
+    assert note.startswith("5 logs repeat the measurements of another log: counted once (")
     for log_id, _ in copies:
         found = shop.log(log_id).detection
         assert log_id in note
         assert found is not None
         assert found.findings is not None
         assert found.findings[0].name == "same grasp"
+
+
+def test_a_cut_log_that_is_looked_at_meanwhile_does_not_count_either(
+    shop: Shop, content: bytes, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither of two jobs at once has seen the other's grasp before both store theirs."""
+    _, job = shop.ingest(encode(ramp.take(slice(-1))))
+    check = pipeline.slipcore.check_log
+
+    def check_late(*arguments: Any) -> Any:
+        monkeypatch.setattr(pipeline.slipcore, "check_log", check)
+        shop.run(shop.ingest(content)[1])
+        return check(*arguments)
+
+    monkeypatch.setattr(pipeline.slipcore, "check_log", check_late)
+    assert shop.run(job).status == "done"
+    with shop.database.read() as session:
+        parts = detections.samples_of_material(session, shop.material_id)
+    assert [len(part.copies) for part in parts] == [1]
 
 
 def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes) -> None:

@@ -1,0 +1,18 @@
+"""By which a grasp is known again that was cut or rounded; logs of before have none until they are looked at anew."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0027"
+down_revision = "0026"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.add_column("detections", sa.Column("signature", sa.LargeBinary(), nullable=True))
+
+
+def downgrade() -> None:
+    with op.batch_alter_table("detections") as table:
+        table.drop_column("signature")
