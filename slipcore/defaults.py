@@ -672,6 +672,14 @@ class CheckOptions(Options):
     """Frames at rest from which the forces in them count as the sensor's zero."""
     zero_share: Annotated[float, Option(0.0, 10.0, "-", "friction of 0.4 is off by 6 % then; scenes to 0.01")] = 0.025
     """Largest mean of what elements read at rest, as a share of their normal force in the grasp."""
+    passing_touch: Annotated[float, Option(0.0, 1.0, "-", "noise above a threshold, and no contact")] = 0.05
+    """Share of the frames in which an element may seem to touch, and count as not touched in the grasp."""
+    free_distance: Annotated[int, Option(0, 1000, "elements", "smoothed forces spread over one to three")] = 2
+    """From elements that touch, up to which others may feel something of the contact."""
+    least_free: Annotated[int, Option(2, 1000000, "elements", "a mean to half of their scatter")] = 4
+    """Elements beyond that from which they tell the sensor's zero during a grasp."""
+    normal_lean: Annotated[float, Option(0.0, 1.0, "-", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
+    """Sine of the largest angle between the mean normal and that of the surface."""
     contact_likeness: Annotated[float, Option(0.0, 1.0, "-", "an offset is alike everywhere, about 0")] = 0.5
     """Correlation over elements of forces at rest with those of the grasp, above which they are a contact's."""
     least_held: Annotated[int, Option(3, 1000000, "frames", "a line and what it leaves")] = 8
@@ -690,6 +698,10 @@ class CheckOptions(Options):
     """How much further than its markers a contact's centre may travel."""
     partial_slip: Annotated[float, Option(0.0, 1.0, "-", "the rim of what is only pressed, up to 0.08 in scenes")] = 0.1
     """Largest share of the contact in slip up to which nothing is taken to slip."""
+    least_friction: Annotated[float, Option(0.0, 1.0, "-", "PTFE on steel, the slipperiest pair, 0.04 to 0.1")] = 0.05
+    """Friction below which some axis is taken to be in another unit."""
+    largest_friction: Annotated[float, Option(1.0, 1e3, "-", "clean rubber on glass 2, rarely more")] = 3.0
+    """Friction above which the same is."""
     friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.44 to 0.53")] = 0.3
     """Largest change of friction from the quarter of samples with the least force to that with the most."""
     place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.20 to 0.31")] = 0.15

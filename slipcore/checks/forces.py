@@ -5,14 +5,17 @@ it is measured, and alike: neither force, place nor scatter shows it. The marker
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.checks.rest import frames_at_rest, touched_elements
 from slipcore.checks.subject import Subject
+from slipcore.errors import InvalidInput
 from slipcore.finding import Finding
-from slipcore.frames import FloatArray
+from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.log_normals import normals_of
 
 ComplexArray = NDArray[np.complex128]
 
@@ -31,6 +34,74 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
         share = f"{off / pressed:.0%} of their force in the grasp"
         evidence = f"elements read {1e3 * off:.2g} mN in the mean while nothing moves them, {share}"
         yield Finding("zero offset", evidence, "zero the sensor before each grasp, with nothing in touch")
+
+
+def zero_drift(seen: Subject) -> Iterator[Finding]:
+    """A zero that moves while the contact is held: by elements that nothing touches, or by the rest after the grasp."""
+    force = _measured(seen)
+    if force is None or not seen.held.any():
+        return
+    touched = touched_elements(seen)
+    pressed = float(np.median(seen.pressing[seen.held], axis=0)[touched].mean()) if touched.any() else 0.0
+    for elements, early, late, where in (_beside_the_contact(seen), _before_and_after(seen, touched)):
+        if min(np.count_nonzero(early), np.count_nonzero(late)) < seen.limits.least_rest or not elements.any():
+            continue
+        moved = np.median(force[late], axis=0) - np.median(force[early], axis=0)
+        off = _alike(moved[elements], force[late][:, elements])
+        if 0.0 < seen.limits.zero_share * pressed < off:
+            share = f"{off / pressed:.0%} of the force of elements in the grasp"
+            evidence = f"elements {where} read {1e3 * off:.2g} mN more at its end than at its begin, {share}"
+            yield Finding("zero drift", evidence, "let the sensor warm up, and zero it before each grasp")
+            return
+
+
+def _beside_the_contact(seen: Subject) -> tuple[BoolArray, BoolArray, BoolArray, str]:
+    """Elements well away from all that touch more than passingly, in the first and the last fifth of the frames held.
+
+    What leaks out to them of a contact's forces is alike in both.
+    """
+    from scipy.ndimage import binary_dilation
+
+    touching = seen.history.contact.mean(axis=0) > seen.limits.passing_touch
+    free = ~binary_dilation(touching, np.ones((3, 3), bool), iterations=seen.limits.free_distance)
+    free &= np.count_nonzero(free) >= seen.limits.least_free
+    order = np.cumsum(seen.held)
+    fifth = max(seen.limits.least_rest, int(order[-1]) // 5)
+    return free, seen.held & (order <= fifth), seen.held & (order > order[-1] - fifth), "beside the contact"
+
+
+def _before_and_after(seen: Subject, touched: BoolArray) -> tuple[BoolArray, BoolArray, BoolArray, str]:
+    """The elements that touch, at rest before the grasp and after it."""
+    rest, moment = frames_at_rest(seen), np.arange(len(seen.held))
+    begin, end = np.flatnonzero(seen.held)[[0, -1]]
+    return touched, rest & (moment < begin), rest & (moment > end), "that it touches"
+
+
+def leaning_normals(seen: Subject) -> Iterator[Finding]:
+    """Normals that lean against the surface that the elements lie on, in all frames: friction splits forces by them."""
+    log = seen.log
+    if log.normal is None or log.has_reconstructed_force or min(log.grid) < 2:
+        return
+    idle = np.flatnonzero(~seen.history.contact.any(axis=(1, 2)))
+    frames = idle if len(idle) > 1 else np.arange(len(log))
+    chosen = log.take(np.unique(frames[np.linspace(0, len(frames) - 1, seen.limits.stretch_frames).astype(int)]))
+    assert chosen.normal is not None
+    try:
+        own = normals_of(replace(chosen, normal=None))
+    except InvalidInput:  # no lattice, of which no shape follows
+        return
+    given, surface = (_direction(each) for each in (chosen.normal, own))
+    lean = float(np.linalg.norm(np.cross(given, surface), axis=-1).min())
+    if lean > seen.limits.normal_lean:
+        degrees = np.degrees(np.arcsin(min(lean, 1.0)))
+        evidence = f"normals lean by {degrees:.1f}° against the surface that the elements lie on, in every frame"
+        yield Finding("leaning normals", evidence, "give normals in the sensor's frame, or none")
+
+
+def _direction(normal: FloatArray) -> FloatArray:
+    """Of the mean of normals [t, n, m, 3] over the elements, [t, 3]."""
+    mean = normal.mean(axis=(1, 2))
+    return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), np.finfo(float).tiny))
 
 
 def _alike(read: FloatArray, readings: FloatArray) -> float:

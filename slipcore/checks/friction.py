@@ -24,6 +24,19 @@ def no_slip(seen: Subject) -> Iterator[Finding]:
         yield Finding("no slip", evidence, "load the object sideways until more than half of the contact slips")
 
 
+def friction_of_surfaces(seen: Subject) -> Iterator[Finding]:
+    """Friction that no surface shows on a sensor's skin: axes of force in different units look so."""
+    if seen.samples is not None and len(seen.samples) >= seen.limits.least_samples:
+        friction = float(np.median(seen.samples.friction_coefficient))
+    elif seen.contact is not None and not seen.contact.is_bound:
+        friction = seen.contact.coefficient
+    else:
+        return
+    if not seen.limits.least_friction <= friction <= seen.limits.largest_friction:
+        evidence = f"friction is {friction:.2g}; skins of sensors show 0.1 to 2 on nearly all that is held"
+        yield Finding("odd friction", evidence, "make sure that all axes of force are in N")
+
+
 def friction_by_force(seen: Subject) -> Iterator[Finding]:
     """Friction that depends on the element's force more than it would by a law within one contact."""
     samples = seen.samples

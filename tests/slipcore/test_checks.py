@@ -17,6 +17,7 @@ from slipcore.checks.contact import _load_ratio
 from slipcore.checks.subject import Subject
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.finding import SEVERITIES
+from slipcore.surface.log_normals import normals_of
 
 Scene = Callable[..., GraspLog]
 
@@ -128,6 +129,19 @@ def leaning(log: GraspLog, degrees: float) -> GraspLog:
     return with_force(log, np.asarray(log.force) @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]))
 
 
+def drifting(log: GraspLog, *drift: float) -> GraspLog:
+    """The zero of each element moves by so many N from the first frame to the last, evenly."""
+    share = np.linspace(0.0, 1.0, len(log))[:, None, None, None]
+    return with_force(log, np.asarray(log.force) + share * np.array(drift))
+
+
+def with_leaning_normals(log: GraspLog, degrees: float) -> GraspLog:
+    """Normals in a frame that is turned about y against that of the markers."""
+    assert log.normal is not None
+    sine, cosine = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    return replace(log, normal=log.normal @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]))
+
+
 FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
     "places for displacement": with_places,
@@ -139,6 +153,9 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "no rest": lambda log: log.take(slice(30, None)),
     "element area": lambda log: replace(log, element_area=10.0 * log.element_area),
     "zero offset": lambda log: with_offset(log, 0.005, 0.0, 0.0),
+    "zero drift": lambda log: drifting(log, 0.005, 0.0, 0.0),
+    "leaning normals": lambda log: with_leaning_normals(log, 3.0),
+    "odd friction": lambda log: with_force(log, np.asarray(log.force) * np.array([9.81, 9.81, 1.0])),
     "leaning forces": lambda log: leaning(log, 8.0),
     "turned axes": lambda log: with_force(log, np.asarray(log.force)[..., [1, 0, 2]]),
     "sideways force without load": with_sideways,
@@ -199,13 +216,66 @@ def test_a_zero_that_is_off_is_found_where_markers_are_seen_in_the_plane_only(
 
 def test_noise_that_outlasts_the_rest_is_no_offset(long_ramp: GraspLog) -> None:
     """Each element's own, 3 mN, goes on for half a second; the rest has a fifth of one."""
-    rng, kept = np.random.default_rng(5), np.exp(-float(long_ramp.time[1] - long_ramp.time[0]) / 0.5)
-    force = np.array(long_ramp.force)
-    noise = rng.normal(0.0, 3e-3, force.shape[1:])
+    assert "zero offset" not in names(with_lasting_noise(long_ramp, 3e-3, 0.5))
+
+
+@pytest.mark.parametrize(
+    "drift", [(-0.005, 0.0, 0.0), (0.0, 0.005, 0.0), (0.0, 0.0, 0.005), (0.0, 0.0, -0.005), (-0.02, 0.0, 0.0)]
+)
+def test_a_zero_that_drifts_is_found_along_each_axis(long_ramp: GraspLog, drift: tuple[float, ...]) -> None:
+    """Friction comes out as 0.37 to 0.46 for 0.4 by those of 5 mN."""
+    for log in (long_ramp, replace(long_ramp, displacement=long_ramp.displacement * np.array([1.0, 1.0, 0.0]))):
+        assert "zero drift" not in names(log)
+        assert "zero drift" in names(drifting(log, *drift))
+
+
+def test_where_all_elements_touch_the_rest_after_the_grasp_shows_a_drift(long_ramp: GraspLog) -> None:
+    """A log that goes back the way it came, of the middle elements alone, all of which touch."""
+    middle = np.s_[:, 7:13, 7:13]
+    fields = [np.asarray(field)[middle] for field in (long_ramp.displacement, long_ramp.force, long_ramp.normal)]
+    displacement, force, normal = (np.concatenate([field, field[::-1]]) for field in fields)
+    time = (long_ramp.time[1] - long_ramp.time[0]) * np.arange(len(force))
+    position, area = long_ramp.position[7:13, 7:13], long_ramp.element_area
+    log = GraspLog(time, position, displacement, area, force=force, normal=normal)
+    assert "zero drift" not in names(log)
+    assert "zero drift" in names(drifting(log, 0.008, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3, 1e-2])
+@pytest.mark.parametrize("lasts", [0.0, 0.5])
+def test_noise_of_each_element_is_no_drift(long_ramp: GraspLog, noise: float, lasts: float) -> None:
+    assert "zero drift" not in names(with_lasting_noise(long_ramp, noise, lasts))
+
+
+def with_lasting_noise(log: GraspLog, deviation: float, lasts: float) -> GraspLog:
+    """Each element's own of so many N, that goes on for so many seconds."""
+    rng = np.random.default_rng(5)
+    kept = np.exp(-float(log.time[1] - log.time[0]) / lasts) if lasts else 0.0
+    force = np.array(log.force)
+    noise = rng.normal(0.0, deviation, force.shape[1:])
     for frame in force:
-        noise = kept * noise + np.sqrt(1.0 - kept**2) * rng.normal(0.0, 3e-3, noise.shape)
+        noise = kept * noise + np.sqrt(1.0 - kept**2) * rng.normal(0.0, deviation, noise.shape)
         frame += noise
-    assert "zero offset" not in names(with_force(long_ramp, force))
+    return with_force(log, force)
+
+
+@pytest.mark.parametrize("degrees", [-10.0, -3.0, 3.0, 9.0])
+def test_normals_in_a_frame_that_leans_are_found(long_ramp: GraspLog, degrees: float) -> None:
+    leaning_log = with_leaning_normals(long_ramp, degrees)
+    assert "leaning normals" in names(leaning_log)
+    assert "leaning normals" in names(leaning_log.take(slice(30, None)))  # also without rest
+    assert "leaning normals" not in names(with_leaning_normals(long_ramp, 1.0))
+
+
+def test_normals_of_the_deformed_shape_lean_nowhere(long_ramp: GraspLog) -> None:
+    shaped = replace(long_ramp, normal=normals_of(replace(long_ramp, normal=None)))
+    assert "leaning normals" not in names(shaped)
+    assert "leaning normals" not in names(shaped.take(slice(30, None)))
+
+
+@pytest.mark.parametrize("gains", [(9.81, 9.81, 1.0), (1.0, 1.0, 9.81)])
+def test_axes_in_different_units_are_found(long_ramp: GraspLog, gains: tuple[float, ...]) -> None:
+    assert "odd friction" in names(with_force(long_ramp, np.asarray(long_ramp.force) * np.array(gains)))
 
 
 @pytest.mark.parametrize(("pressed", "noise"), [(1.0, 2e-3), (0.3, 2e-3), (6.0, 2e-2)])
