@@ -11,6 +11,7 @@ SEVERITIES: dict[str, Severity] = {
     "gripper's force contradicted": "note",
     "forces not checked": "note",
     "same grasp": "note",
+    "another's calibration": "note",
     "slow frames": "note",
     "no displacement": "note",
     "places for displacement": "warning",

@@ -29,7 +29,9 @@ SAME_GRASPS = "same_grasps"
 """Diagnostic, a sentence: which of a material's logs are of a grasp that another log of it has, and do not count."""
 UNCHECKED = "unchecked_logs"
 """Diagnostic, a sentence: how many of a material's logs an older version stored without looking for findings."""
-NOTES = (WEAKENING, SAME_GRASPS, UNCHECKED, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
+OTHERS_CALIBRATIONS = "others_calibrations"
+"""Diagnostic, a sentence: how many of a material's logs another key's calibration corrects than sent them."""
+NOTES = (WEAKENING, SAME_GRASPS, UNCHECKED, OTHERS_CALIBRATIONS, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

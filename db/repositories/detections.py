@@ -88,7 +88,7 @@ def signatures(session: Session, log_id: str, most: int, since: datetime = EVER)
     ordered = with_one.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)
     with session.execute(ordered.execution_options(yield_per=10)) as rows:  # which may be left before their end
         for row in rows:
-            yield Signature(*row)
+            yield Signature(row.fingerprint or "", row.signature or b"")
 
 
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:

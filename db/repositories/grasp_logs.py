@@ -139,8 +139,14 @@ def restore(session: Session, log_id: str) -> bool:
     return was_withdrawn
 
 
+def are_all_of(session: Session, sensor_id: int, key_id: str | None) -> bool:
+    """Whether nobody but this key has sent logs of a sensor, withdrawn ones too."""
+    others = (GraspLogRow.sensor_id == sensor_id, GraspLogRow.uploaded_by.is_distinct_from(key_id))
+    return session.scalar(select(GraspLogRow.id).where(*others).limit(1)) is None
+
+
 def change_sensor(session: Session, log_id: str, sensor: str) -> None:
-    """Let a log be another sensor's, as if it were sent now; raises ``NotFound``."""
+    """Let a log be this sensor's as it is known now, as if it were sent now; raises ``NotFound``."""
     row = _locked(session, log_id)
     row.sensor_id = sensors.find_or_add(session, sensor)
     row.calibration = calibrations.newest_version(session, row.sensor_id)

@@ -1,6 +1,7 @@
 """What is wrong with a sensor, from stored logs of presses, and the correction of its later logs by that."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from sqlalchemy.orm import Session
 
 from db.blobs import disk_errors_named
-from db.records import Calibration, CalibrationPress, NewCalibration
+from db.records import Calibration, CalibrationPress, NewCalibration, Sensor
 from db.repositories import calibrations, grasp_logs, sensors
 from service import formats
 from service.domain.changes import record
@@ -19,10 +20,13 @@ from service.domain.sensors import check_name
 from slipcore.errors import SlipcoreError
 
 if TYPE_CHECKING:
-    from slipcore import GraspLog, SensorModel
+    from slipcore import Finding, GraspLog, SensorModel
 
 MOST_ELEMENTS = 20_000_000
 """Frames times elements of all logs of a calibration: half a minute, and a gigabyte of memory."""
+
+CORRECTED_BY_ANOTHER = "another's calibration"
+"""The finding of a log that a calibration corrects which another key stored."""
 
 OFFSET = "<f8"
 """Numbers of a stored zero."""
@@ -30,13 +34,14 @@ OFFSET = "<f8"
 
 class Correction(NamedTuple):
     """A log as its sensor's calibration corrects it: of which ``version``, what it ``changed``, in words, and the
-    ``options`` of detection.
+    ``options`` of detection; ``by``: the key that stored the calibration.
     """
 
     log: "GraspLog"
     version: int | None
     changed: tuple[str, ...] | None
     options: Mapping[str, float]
+    by: str | None = None
 
 
 async def calibrate(
@@ -44,9 +49,9 @@ async def calibrate(
 ) -> Calibration:
     """Store what presses say of a sensor's faults; its logs that come in from then on are corrected by it.
 
-    All keys' logs are: whoever may upload may calibrate it once, and only admins again. Raises ``NotFound`` for a
-    sensor or a log, ``FileDeleted``, ``InsufficientScope``, and ``InvalidValue`` for logs that are another sensor's or
-    no pure presses, with what was seen in each.
+    All keys' logs are: who may upload may calibrate once what only they have sent logs of; all else is for admins.
+    Raises ``NotFound`` for a sensor or a log, ``FileDeleted``, ``InsufficientScope``, and ``InvalidValue`` for logs
+    that are another sensor's or no pure presses, with what was seen in each.
     """
     hashes = await context.threads.run(principal.share, _hashes, context, sensor, presses, principal)
     paths = await context.files(principal.share, hashes)
@@ -62,7 +67,7 @@ async def calibrate(
 def _store(context: Context, sensor: str, new: NewCalibration, principal: Principal) -> Calibration:
     with context.database.write() as session:
         stored = calibrations.add(session, sensor, new)  # the next one waits for the sensor's row
-        _check_right(stored.version - 1 or None, principal)
+        _check_right(session, replace(sensors.get(session, sensor), calibration=stored.version - 1 or None), principal)
         details = {"version": stored.version, "grasp_logs": [press.grasp_log for press in new.presses]}
         record(session, principal, "sensor.calibrated", sensor, details)
     return stored
@@ -75,8 +80,6 @@ def learn(
 
     The logs themselves may name their sensor otherwise.
     """
-    from dataclasses import replace
-
     from slipcore import calibrate_sensor
 
     with disk_errors_named():
@@ -90,18 +93,27 @@ def corrected(session: Session, log: "GraspLog", sensor: str, version: int | Non
     """A log by this version of its sensor's calibration, None for none; not where its lattice is another."""
     if version is None:
         return Correction(log, None, None, {})
-    model = sensor_model(calibrations.get(session, sensor, version))
+    stored = calibrations.get(session, sensor, version)
+    model = sensor_model(stored)
     if model.grid != log.grid:
         theirs, own = (" × ".join(map(str, grid)) for grid in (model.grid, log.grid))
         return Correction(log, version, (f"nothing: calibrated on {theirs} elements, and the log has {own}",), {})
     found = model.apply(log, method)
-    return Correction(found.log, version, found.changed, found.options)
+    return Correction(found.log, version, found.changed, found.options, stored.new.created_by)
+
+
+def correction_findings(correction: Correction, uploaded_by: str | None) -> "list[Finding]":
+    """That a log is corrected by a calibration which another key stored than sent the log."""
+    from slipcore import Finding
+
+    if correction.by is None or correction.by == uploaded_by:
+        return []
+    evidence = f"version {correction.version} of the sensor's calibration, stored by key {correction.by}, corrects it"
+    return [Finding(CORRECTED_BY_ANOTHER, evidence, "see what it changed; send logs under a sensor's name of your own")]
 
 
 def sensor_model(stored: Calibration) -> "SensorModel":
     """As it was learnt."""
-    from dataclasses import replace
-
     import numpy as np
 
     from slipcore import SensorModel
@@ -112,8 +124,11 @@ def sensor_model(stored: Calibration) -> "SensorModel":
     return replace(model, offset=np.frombuffer(stored.new.offset, OFFSET).reshape(*model.grid, 3))
 
 
-def _check_right(known_version: int | None, principal: Principal) -> None:
-    if known_version is not None and not principal.is_admin:
+def _check_right(session: Session, sensor: Sensor, principal: Principal) -> None:
+    """Others' logs of a sensor, and what is known of it, are not for whoever may upload to bend."""
+    if principal.is_admin:
+        return
+    if sensor.calibration is not None or not grasp_logs.are_all_of(session, sensor.id, principal.key_id):
         raise InsufficientScope("upload", "admin")
 
 
@@ -121,7 +136,7 @@ def _hashes(context: Context, sensor: str, presses: Sequence[CalibrationPress], 
     """Of the logs, each of which is one of this sensor's, is not withdrawn and counts once; together not too much."""
     check_name(sensor)
     with context.database.read() as session:
-        _check_right(sensors.get(session, sensor).calibration, principal)
+        _check_right(session, sensors.get(session, sensor), principal)
         logs = [grasp_logs.get(session, press.grasp_log) for press in presses]
     first_of: dict[str, str] = {}
     for log in logs:

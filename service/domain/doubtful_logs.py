@@ -4,8 +4,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from service.domain.calibrate import CORRECTED_BY_ANOTHER
 from slipcore.checks import AGAINST_FRICTION
-from stiction_client.support import UNCHECKED
+from stiction_client.support import OTHERS_CALIBRATIONS, UNCHECKED
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -20,6 +21,16 @@ def with_doubts(model: "FrictionModel", findings: Sequence[Collection[str]]) -> 
     logs = "log is" if len(doubts) == 1 else "logs is" if doubtful == 1 else "logs are"
     told = f"{doubtful} of {len(doubts)} {logs} doubtful ({', '.join(sorted(set().union(*doubts)))})"
     return replace(model, diagnostics={**model.diagnostics, "doubtful_logs": told})
+
+
+def with_others_calibrations(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
+    """The model with a note among its diagnostics where calibrations by another key than sent them correct logs."""
+    count = sum(CORRECTED_BY_ANOTHER in names for names in findings)
+    if not count:
+        return model
+    are = "log is" if len(findings) == 1 else "logs is" if count == 1 else "logs are"
+    told = f"{count} of {len(findings)} {are} corrected by a sensor's calibration that another key stored"
+    return replace(model, diagnostics={**model.diagnostics, OTHERS_CALIBRATIONS: told})
 
 
 def with_unchecked(model: "FrictionModel", findings: Sequence[Collection[str] | None]) -> "FrictionModel":

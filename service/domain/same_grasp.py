@@ -100,7 +100,7 @@ def is_alike(one: bytes, other: bytes) -> bool:
 def _signs(readings: int) -> "FloatArray":
     """Of each reading in each sum, [readings, SUMS], 1 or -1: the same in every version."""
     drawn = hashlib.shake_256(b"stiction").digest(readings * SUMS // 8)
-    return 2.0 * np.unpackbits(np.frombuffer(drawn, np.uint8)).reshape(readings, SUMS) - 1.0
+    return np.asarray(2.0 * np.unpackbits(np.frombuffer(drawn, np.uint8)).reshape(readings, SUMS) - 1.0, float)
 
 
 def _noise(sums: "FloatArray") -> "FloatArray":

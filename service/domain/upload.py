@@ -200,7 +200,8 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         log_id, is_new = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), False
         known = grasp_logs.get(session, log_id)
         is_others = received.names_sensor and known.sensor != sensor
-        if not is_others and not _may_differ(session, known):
+        is_outdated = not is_others and _is_calibrated_anew(session, known)
+        if not (is_others or is_outdated or _may_differ(session, known)):
             return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
         if is_others:
@@ -208,7 +209,9 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
             _change_sensor(session, known, material_id, sensor, principal)
             told = {"sensor": sensor, "sensor_before": known.sensor}
             record(session, principal, "grasp_log.sensor_changed", log_id, told)
-        if is_others or not _can_go_on(session, known):
+        if is_outdated:
+            grasp_logs.change_sensor(session, log_id, known.sensor)
+        if is_others or is_outdated or not _can_go_on(session, known):
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
@@ -261,6 +264,12 @@ def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     findings = () if found is None else found.findings or ()
     by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
     return by_gel and job.finished_at is not None and _gel(session, log) != (None if found is None else found.gel)
+
+
+def _is_calibrated_anew(session: Session, log: StoredGraspLog) -> bool:
+    """Whether its job has ended, and its sensor was calibrated since it was sent."""
+    is_newer = stored_sensors.get(session, log.sensor).calibration != log.calibration
+    return is_newer and log.job.finished_at is not None
 
 
 def _is_unchecked(found: Detection) -> bool:

@@ -25,9 +25,9 @@ from db.repositories import audit, detections, friction_models, grasp_logs, jobs
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
 from service import formats
-from service.domain.calibrate import corrected
+from service.domain.calibrate import corrected, correction_findings
 from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import with_doubts, with_unchecked
+from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_unchecked
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
@@ -176,7 +176,12 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
-        findings = [*same_grasp(others), *reconstruction_findings(log, reconstruction), *findings]
+        findings = [
+            *same_grasp(others),
+            *correction_findings(correction, stored.uploaded_by),
+            *reconstruction_findings(log, reconstruction),
+            *findings,
+        ]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
@@ -284,7 +289,8 @@ def _fit_by(
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
     findings = [part.findings for part in parts]
-    model = with_unchecked(with_doubts(model, [each or () for each in findings]), findings)
+    told = [each or () for each in findings]
+    model = with_unchecked(with_others_calibrations(with_doubts(model, told), told), findings)
     return with_copies(model, parts)
 
 

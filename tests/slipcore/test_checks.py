@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from service.domain.calibrate import CORRECTED_BY_ANOTHER
 from service.domain.reconstruct import CONTRADICTED, RECONSTRUCTED
 from slipcore import Finding, GraspLog, InvalidInput, check_log, collect_friction, detect_slip
 from slipcore.checks import AGAINST_FRICTION
@@ -425,6 +426,7 @@ def findings_in_code() -> set[str]:
     return {name for source in sources for name in re.findall(r'\bFinding\(\s*"([^"]+)"', source)} | {
         RECONSTRUCTED,
         CONTRADICTED,
+        CORRECTED_BY_ANOTHER,
     }
 
 

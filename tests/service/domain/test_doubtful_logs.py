@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel
-from service.domain.doubtful_logs import with_doubts, with_unchecked
+from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_unchecked
 from stiction_client.support import notes
 
 MODEL = FrictionModel(
@@ -41,6 +41,12 @@ def test_findings_against_friction_are_counted_and_named(findings: list[list[str
 def test_findings_that_less_was_seen_speak_not_against_friction() -> None:
     assert with_doubts(MODEL, [["no rest", "slow frames", "repeated frames", "no displacement"], []]) is MODEL
     assert MODEL.support == "supported"
+
+
+def test_logs_that_others_calibrations_correct_are_counted() -> None:
+    (note,) = notes(with_others_calibrations(MODEL, [["another's calibration", "no rest"], []]).diagnostics)
+    assert note.startswith("1 of 2 logs is corrected by a sensor's calibration that another key stored")
+    assert with_others_calibrations(MODEL, [["no rest"], []]) is MODEL
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,8 @@ from db.database import Database
 from db.records import Gel, NewCalibration
 from db.repositories import calibrations, detections, grasp_logs, jobs, materials, runners, sensors
 from db.tables import DetectionRow, JobRow
-from service.domain.calibrate import OFFSET, corrected
+from service.domain import keys
+from service.domain.calibrate import OFFSET, corrected, correction_findings
 from service.domain.reconstruct import RECONSTRUCTED
 from service.domain.sensors import NAMELESS
 from service.jobs import pipeline
@@ -394,7 +395,7 @@ def test_logs_are_corrected_by_the_calibration_that_was_there_when_they_came(
     assert client.get(f"/v1/sensors/{quote(sensor, safe='')}").json()["calibration"] == 2
     entries = client.get("/v1/audit", params={"subject": sensor}).json()["items"]
     assert [entry["details"]["version"] for entry in entries if entry["action"] == "sensor.calibrated"] == [2, 1]
-    assert sent(2)["detection"] == after  # as it was corrected first
+    assert sent(2)["detection"]["calibration"] == 2  # it is looked at again by the newest
 
 
 def test_logs_that_are_no_pure_presses_are_refused_with_what_was_seen(
@@ -445,6 +446,40 @@ def test_a_sensor_is_calibrated_again_by_admins_only(
     assert answered(first) == (403, "/problems/insufficient-scope")
     assert answered(admin) == allowed
     assert answered(reach(key=make("read"))) == (403, "/problems/insufficient-scope")
+
+
+def test_a_sensor_of_others_logs_is_calibrated_by_admins_only(
+    reach: Callable[..., Any], make: Callable[..., str], ball: GraspLog
+) -> None:
+    """One key's presses had bent everybody's later logs of that sensor."""
+    first, second = (reach(key=make("upload")) for _ in range(2))
+    path, body = "/v1/sensors/both/calibrations", {"presses": [{"grasp_log": "0" * 32}]}
+
+    def answered(caller: Any) -> int:
+        return int(caller.request("POST", path, json=body).status_code)
+
+    for caller, seed in ((first, 1), (second, 2)):
+        content = encode(FAULTS.put_into(ball, seed))
+        sent = caller.request("POST", "/v1/grasp-logs?sensor=both", content=content, headers={"content-type": NPZ})
+        assert sent.status_code == httpx.codes.ACCEPTED
+        assert [answered(each) for each in (first, second)] == ([404, 403] if caller is first else [403, 403])
+    assert answered(reach(key=make("admin"))) == 404
+
+
+def test_what_another_key_calibrated_is_told_of_a_log_and_its_material(
+    database: Database, make: Callable[..., str], ball: GraspLog
+) -> None:
+    model = calibrate_sensor([FAULTS.put_into(ball, 1)])
+    own, other = (keys.key_id(make("upload")) for _ in range(2))
+    with database.write() as session:
+        sensors.find_or_add(session, "theirs")
+        stored = NewCalibration((), replace(model, offset=None).to_json(), None, other)
+        calibrations.add(session, "theirs", stored)
+        correction = corrected(session, ball, "theirs", 1, "filter")
+    assert correction_findings(correction, other) == []
+    (found,) = correction_findings(correction, own)
+    assert f"stored by key {other}" in found.evidence
+    assert correction_findings(correction._replace(by=None), own) == []
 
 
 def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database, ball: GraspLog) -> None:
