@@ -13,12 +13,18 @@ from service.app import create_app
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.request_middleware import MOST_HEADER_BYTES
 from service.http.websockets import WebSocketConnection
+from service.processes import limits
 from service.settings import Settings
 
 logger = logging.getLogger(__name__)
 
 OWN_ADDRESS = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Of a server that listens on all addresses of the machine, the one for a browser on it."""
+
+OWN_FILES, FILES_OF_A_CONNECTION = 200, 2
+"""Files that a server has open beside its connections, of database, readers and workers; a connection is one, and the
+body on its way another.
+"""
 
 MOST_MESSAGE_BYTES = 2**20
 """Of one message of the live stream: a frame of 4096 markers with forces is 200 kB."""
@@ -48,7 +54,7 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         port=settings.port,
         http=partial(parsed_connection(), per_address=settings.max_connections_per_address),  # type: ignore[arg-type]
         h11_max_incomplete_event_size=MOST_HEADER_BYTES,
-        limit_concurrency=settings.max_connections,
+        limit_concurrency=_connections(settings),
         server_header=False,
         proxy_headers=bool(settings.trusted_proxies),  # by default the server would believe any proxy on this machine,
         forwarded_allow_ips=settings.trusted_proxies,  # or those of a variable that is not ours
@@ -60,6 +66,21 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
         **options,
     )
+
+
+def _connections(settings: Settings) -> int:
+    """As many at once as the settings say, or as there may be files for."""
+    wanted = OWN_FILES + FILES_OF_A_CONNECTION * settings.max_connections
+    allowed = limits.open_files(wanted)
+    if allowed >= wanted:
+        return settings.max_connections
+    fitting = max((allowed - OWN_FILES) // FILES_OF_A_CONNECTION, 1)
+    logger.warning(
+        "%d connections at once in place of %d (STICTION_MAX_CONNECTIONS): this process may have %d files open "
+        "(ulimit -Hn, LimitNOFILE=), and they take %d",
+        *(fitting, settings.max_connections, allowed, wanted),
+    )
+    return fitting
 
 
 def parsed_connection() -> type[BoundedConnection]:

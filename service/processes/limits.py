@@ -1,4 +1,4 @@
-"""What a process takes of the machine, and how much memory it may take (Linux; elsewhere nothing is limited)."""
+"""What a process takes of the machine, and how much memory and how many files it may (Linux; elsewhere unlimited)."""
 
 import os
 import sys
@@ -36,6 +36,22 @@ def memory(budget: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def open_files(wanted: int) -> int:
+    """Let this process have so many files open, or as many as the machine allows it; returns how many it may have.
+
+    Shells and systemd begin with 1,024 and let a process raise that itself.
+    """
+    if sys.platform != "linux":
+        return wanted
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+    return wanted if soft == resource.RLIM_INFINITY else max(soft, most)
 
 
 def require(amount: int) -> None:
