@@ -9,7 +9,7 @@ from estimators.linear.priors import ScatterPrior
 from estimators.method_names import METHODS, SCATTER_METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
 from estimators.methods.automatic import choose, compared
-from estimators.methods.reporting import element_areas
+from estimators.methods.reporting import Diagnostics, areas_of_sensors, element_areas
 
 
 def needs_samples(method: str, grasps: int) -> bool:
@@ -62,11 +62,22 @@ def fit(
     data, areas = gather(samples), element_areas(samples)
     if method != "auto":
         model = _fit(data, method, accuracy, seconds, seed, likelihood, loss, scatter_prior)
-        return replace(model, diagnostics={**model.diagnostics, **areas}) if areas else model
+        return _with_areas(model, samples, areas)
     choice = choose(data)
     model = hierarchical.fit(choice.data, scatter_prior)
     told = {"chosen_because": choice.reason, "check": compared(model, choice.data), **areas}
-    return replace(model, diagnostics={**model.diagnostics, **told})
+    return _with_areas(model, samples, told)
+
+
+def _with_areas(model: FrictionModel, samples: GraspData, told: Diagnostics) -> FrictionModel:
+    """The model with these diagnostics, and with the area of the elements of each sensor that it knows."""
+    model = replace(model, diagnostics={**model.diagnostics, **told}) if told else model
+    known = None if model.scales is None else model.scales.between_sensors
+    if model.scales is None or known is None:
+        return model
+    own = areas_of_sensors(samples)
+    sensors = {name: replace(each, element_area=own.get(name)) for name, each in known.sensors.items()}
+    return replace(model, scales=replace(model.scales, between_sensors=replace(known, sensors=sensors)))
 
 
 def _fit(

@@ -51,6 +51,7 @@ class Scale:
 class SensorFriction:
     """Friction as one known sensor shows it: by which part its ratio of forces exceeds the sensors' average, ``gain``
     with its ``standard_error``; the other fields are those of a model of this sensor alone, new grasps of it.
+    ``element_area``: m² of its own elements, whatever those of the model are; None where an older version fitted it.
     """
 
     gain: float
@@ -60,6 +61,7 @@ class SensorFriction:
     degrees_of_freedom: float
     scale: float
     scatter_degrees_of_freedom: float
+    element_area: float | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "SensorFriction":
@@ -72,6 +74,7 @@ class SensorFriction:
             recorded.degrees_of_freedom(record["degrees_of_freedom"]),
             recorded.number("scale", record["scale"], least=0.0),
             recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
+            None if (area := record.get("element_area")) is None else recorded.number("element_area", area, above=0.0),
         )
 
     def enlarged(self, part: float) -> "SensorFriction":
@@ -271,6 +274,13 @@ class LinearFriction:
             scatter_degrees_of_freedom=sensor.scatter_degrees_of_freedom,
             scales=replace(self.scales, between_sensors=None),
         )
+
+    def on_sensor(self, name: str) -> Self:
+        """What ``of_sensor`` gives, with forces on an element of that sensor's own, where its area is known."""
+        known = None if self.scales is None or self.scales.between_sensors is None else self.scales.between_sensors
+        own = None if known is None or name not in known.sensors else known.sensors[name].element_area
+        model = self.of_sensor(name)
+        return model if own is None or own == model.element_area else model.at_element_area(own)
 
     def at_element_area(self, area: float) -> Self:
         """The same friction with forces on an element of ``area`` m²: under the same pressure it bears in proportion

@@ -1,5 +1,6 @@
 """What every method reports of its data and of what it found, in one form."""
 
+import math
 import time
 from collections.abc import Sequence
 
@@ -16,6 +17,7 @@ from estimators.linear.normal_mixture import mixture_quantile
 from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
+from estimators.linear.statistics import SufficientStatistics
 from estimators.methods.identifiability import effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 from stiction_client.support import ELEMENT_AREAS, SENSOR_GAIN
@@ -54,6 +56,16 @@ def element_areas(samples: GraspData) -> Diagnostics:
         return {}
     told = f"its grasps are by elements of {least} to {most} mm²"
     return {ELEMENT_AREAS: f"{told}: normal forces are those of one of {least} mm², unless its area is given"}
+
+
+def areas_of_sensors(samples: GraspData) -> dict[str, float]:
+    """The element area of each sensor, m²: the smallest, where its grasps have several."""
+    areas: dict[str, float] = {}
+    for part in samples if isinstance(samples, Sequence) else [samples]:
+        named = [grasp.sensor for grasp in part.grasps] if isinstance(part, SufficientStatistics) else [part.sensor]
+        for name in named:
+            areas[name] = min(areas.get(name, math.inf), part.element_area)
+    return areas
 
 
 def sensor_gain(nodes: ScaleNodes) -> Diagnostics:

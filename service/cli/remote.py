@@ -212,7 +212,7 @@ def plan(
     _check_area(contact_area)
     with connected(url, key) as client:
         model = client.model(material, method=method)
-    model = model if sensor is None else model.of_sensor(sensor)
+    model = model if sensor is None else model.on_sensor(sensor)
     answer = required_normal_force(
         model,
         load,

@@ -16,7 +16,7 @@ class FrictionQuery:
 
     ``of``: one "element", or the mean over the ``elements`` of a "contact". ``sensor``: the name of that which grasps;
     of one whose own gain the model does not know, and without any, the answer allows for any gain. ``element_area``:
-    m² of the element that bears the force, the model's where None.
+    m² of the element that bears the force; where None, the sensor's own or, without any, the model's.
     """
 
     tangential_velocity: float
@@ -59,7 +59,7 @@ def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
     """The answer of a material's current model."""
     stored = known.stored
     v, f_n = question.tangential_velocity, question.normal_force
-    model = known.model if question.sensor is None else known.model.of_sensor(question.sensor)
+    model = known.model if question.sensor is None else known.model.on_sensor(question.sensor)
     model = model if question.element_area is None else model.at_element_area(question.element_area)
     mean = float(model.predict(v, f_n))
     asked = (

@@ -151,7 +151,7 @@ def force_curve(context: Context, task: GraspTask, probabilities: NDArray[np.flo
 
 def _of_sensor(known: KnownModel, task: GraspTask) -> stiction_client.FrictionModel:
     model = to_client_model(known.stored)
-    return model if task.sensor is None else model.of_sensor(task.sensor)
+    return model if task.sensor is None else model.on_sensor(task.sensor)
 
 
 def _model(context: Context, task: GraspTask) -> KnownModel:

@@ -69,6 +69,20 @@ def test_gains_are_separated_where_grasps_scatter_less() -> None:
     assert low[0] < low[1]  # a new sensor's gain may be any
 
 
+@pytest.mark.parametrize("method", ["hierarchical", "auto"])
+def test_a_sensor_is_answered_for_its_own_element(method: str) -> None:
+    """Of one whose elements are four times as large: the same pressure has the same friction."""
+    parts = material({"fine": 0.0, "coarse": 0.0}, 3, tau=0.02)
+    large = [part.at_element_area(4e-6) if part.grasps[0].sensor == "coarse" else part for part in parts]
+    model, alike = (estimators.fit(each, method=method) for each in (large, parts))
+    assert (model.element_area, model.on_sensor("coarse").element_area) == (1e-6, 4e-6)
+    assert model.on_sensor("fine").element_area == model.on_sensor("nobody's").element_area == 1e-6
+    v, f_n = AT
+    expected = alike.of_sensor("coarse").predict(v, f_n, 0.05, "contact", 60)
+    assert model.on_sensor("coarse").predict(v, 4.0 * f_n, 0.05, "contact", 15) == pytest.approx(expected, rel=1e-9)
+    assert alike.on_sensor("coarse").coefficients.tolist() == alike.of_sensor("coarse").coefficients.tolist()
+
+
 def test_a_gain_that_scatter_hides_is_said_to_be_hidden() -> None:
     model = estimators.fit(material({"left": 0.0, "right": 0.0}, 1, tau=0.15), method="hierarchical")
     assert model.notes[0].startswith("a sensor's own gain cannot be separated from scatter between grasps")

@@ -21,7 +21,11 @@ SupportKind = Annotated[
 Advice = Annotated[str, Field(description="What to do about it, in one sentence")]
 GraspingSensor = Annotated[
     Reference | None,
-    Field(max_length=200, description="That grasps: its own gain counts where the model knows it, else that of any"),
+    Field(
+        min_length=1,
+        max_length=200,
+        description="That grasps: its own gain counts where the model knows it, else that of any",
+    ),
 ]
 Notes = Annotated[list[str], Field(description="What else is to be known of the model, in sentences")]
 
@@ -92,6 +96,9 @@ class SensorFrictionOut(BaseModel):
     degrees_of_freedom: Annotated[float | None, Field(description="Of the coefficients' Student-t; null: normal")]
     scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
     scatter_degrees_of_freedom: Annotated[float | None, Field(description="Of the scatter's Student-t; null: normal")]
+    element_area: Annotated[
+        float | None, Field(description="m² of its own elements, of which look-ups with `sensor` are; null: not known")
+    ] = None
 
 
 class SensorScaleOut(ScaleOut):

@@ -77,6 +77,12 @@ def test_friction_of_the_sensor_that_grasps_has_its_own_gain(
     f_n = sum(model.domain.normal_force) / 2.0
     means = [ask(several, FrictionQuery(0.0, f_n, None, sensor=name)).mean for name in (None, "right", "left")]
     assert means == [float(several.predict(0.0, f_n))] * 2 + [0.7]
+    own = {"left": replace(shown, element_area=4.0 * model.element_area)}
+    coarse = replace(model, scales=replace(scales, between_sensors=estimators.SensorScale(one, own)))
+    answer = ask(coarse, FrictionQuery(0.0, 4.0 * f_n, None, sensor="left"))
+    assert (answer.element_area, answer.mean) == (4.0 * model.element_area, pytest.approx(0.7))
+    asked = ask(coarse, FrictionQuery(0.0, f_n, None, sensor="left", element_area=model.element_area))
+    assert (asked.element_area, asked.mean) == (model.element_area, pytest.approx(0.7))
 
 
 def test_slower_than_the_samples_is_inside_and_faster_is_not(
