@@ -387,7 +387,10 @@ def test_displacement_beyond_the_range_is_found_with_its_axis(long_ramp: GraspLo
 
 
 def test_a_log_without_any_tangential_force_is_looked_through(long_ramp: GraspLog) -> None:
-    assert names(with_force(long_ramp, np.asarray(long_ramp.force) * [0.0, 0.0, 1.0])) <= {"force too large", "odd friction"}
+    assert names(with_force(long_ramp, np.asarray(long_ramp.force) * [0.0, 0.0, 1.0])) <= {
+        "force too large",
+        "odd friction",
+    }
 
 
 def test_frames_that_pull_among_others_that_press_are_looked_through(long_ramp: GraspLog) -> None:
