@@ -6,7 +6,7 @@ import estimators
 from db.records import NewModel
 from estimators import FrictionModel, Moments, ScatterPrior
 from service.domain.stored_results import to_new_model
-from service.domain.weakening import BEFORE, EFFECT, LOG, with_weakening
+from service.domain.weakening import BEFORE, EFFECT, LOG, SENSOR, with_weakening
 from tests.estimators.test_influence import grasp
 
 PRIOR = ScatterPrior()
@@ -64,6 +64,15 @@ def test_no_log_is_blamed_for_being_the_first_of_another_sensor() -> None:
     assert model.scales.between_sensors is not None
     assert LOG not in model.diagnostics
     assert any("sensor" in note for note in model.notes)
+
+
+def test_a_fall_of_one_sensor_alone_is_told_with_its_name() -> None:
+    """By a tenth of friction as any sensor shows it nothing falls here."""
+    steady = {f"log{k}": grasp(k, 0.0).of_sensor("a" if k % 2 else "b") for k in range(20)}
+    before = fitted(steady)
+    model = fitted(steady | {"log20": grasp(50, -0.2).of_sensor("b")}, before)[0]
+    assert (model.diagnostics[LOG], model.diagnostics[SENSOR]) == ("log20", "b")
+    assert "a planner with the sensor 'b' may count on" in model.notes[0]
 
 
 def test_a_first_fit_has_nothing_to_compare_with() -> None:
