@@ -34,6 +34,11 @@ def bring_back(session: Session, sha256: str) -> bool:
     return True
 
 
+def newest(session: Session) -> datetime | None:
+    """When the last log was stored."""
+    return session.scalar(select(func.max(GraspLogRow.created_at)))
+
+
 def count_old(session: Session, before: datetime) -> tuple[int, int]:
     """How many files may go, those older than ``before`` that nothing needs, and their bytes."""
     files = _old(before).add_columns(GraspLogRow.bytes).distinct().subquery()

@@ -15,6 +15,7 @@ from db.records import Actor
 from db.repositories import audit, uploads
 from db.tables import now
 from service.jobs import garbage
+from service.jobs.steady_clock import SteadyClock
 from service.periodic_thread import PeriodicThread
 
 logger = logging.getLogger(__name__)
@@ -71,7 +72,7 @@ class Retention:
     """Prunes now and then, in whichever process ``leads`` the others.
 
     ``days``: after which uploads go; ``unreferenced_days``: after which files to which nothing refers do;
-    ``audit_days``: after which entries of the audit trail do.
+    ``audit_days``: after which entries of the audit trail do. Not while the clock may be wrong (``SteadyClock``).
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Retention:
         self._age = None if days is None else timedelta(days=days)
         self._grace = None if unreferenced_days is None else timedelta(days=unreferenced_days)
         self._audit_age = None if audit_days is None else timedelta(days=audit_days)
-        self._next_garbage = 0.0
+        self._next_garbage, self._clock = 0.0, SteadyClock()
         self._thread = PeriodicThread("retention", LOOK_SECONDS, self._look)
 
     def start(self) -> None:
@@ -100,9 +101,9 @@ class Retention:
         await self._thread.stop()
 
     def _look(self) -> None:
-        if not self._leads():
-            return
         try:
+            if not self._clock.is_believed(self._newest()) or not self._leads():
+                return
             if self._age is not None:
                 self._prune(self._age)
             if self._audit_age is not None:
@@ -113,6 +114,10 @@ class Retention:
             logger.warning("nothing old is deleted: %s", error)
         except Exception:
             logger.exception("nothing old is deleted")
+
+    def _newest(self) -> datetime | None:
+        with self._database.read() as session:
+            return uploads.newest(session)
 
     def _prune(self, age: timedelta) -> None:
         if deleted := prune(self._database, self._blobs, now() - age, lambda: self._thread.is_stopping):

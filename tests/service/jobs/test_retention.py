@@ -22,7 +22,7 @@ from service import formats
 from service.cli import main
 from service.http.download import Download
 from service.http.routes import grasp_logs
-from service.jobs import pipeline, retention
+from service.jobs import pipeline, retention, steady_clock
 from service.jobs.retention import Retention, prune
 from service.settings import Settings
 from slipcore import GraspLog
@@ -307,6 +307,19 @@ def test_logs_of_before_have_their_files_and_those_without_stop_the_way_back(she
     assert shelf.prune() == 1
     with closing(Database(shelf.database.url)) as database, pytest.raises(SchemaMismatch, match="1 grasp logs have no"):
         migrate.downgrade(database, "0006")
+
+
+def test_nothing_is_deleted_by_a_clock_that_jumps(
+    shelf: Shelf, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log_id = shelf.store(content, days=1)
+    kept = Retention(shelf.database, shelf.blobs, 90.0, lambda: True)
+    kept._look()
+    for module in (retention, steady_clock):
+        monkeypatch.setattr(module, "now", lambda: now() + timedelta(days=200))
+    for _ in range(3):
+        kept._look()
+    assert shelf.file(log_id).status_code == httpx.codes.OK
 
 
 def test_old_entries_of_the_audit_trail_are_deleted_where_that_is_set(database: Database, blobs: BlobStore) -> None:
