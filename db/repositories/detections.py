@@ -155,14 +155,18 @@ def any_samples(session: Session, material_id: int) -> bool:
     return session.scalar(query) is not None
 
 
-def least_friction(session: Session, material_id: int) -> float | None:
-    """What friction is at least, by the loads that the contacts in a material's logs bore; None where none does."""
+def least_frictions(session: Session, material_id: int) -> list[tuple[float, tuple[str, ...]]]:
+    """What friction is at least by the load that the contact of each of a material's logs bore, and the log's findings.
+
+    Withdrawn logs, and those that an older version did not look for findings in, are left out.
+    """
     query = (
-        select(DetectionRow.contact_friction)
+        select(DetectionRow.contact_friction, DetectionRow.findings)
         .join(GraspLogRow, GraspLogRow.id == DetectionRow.grasp_log_id)
         .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
     )
-    return max((float(found["low"]) for found in session.scalars(query) if found is not None), default=None)
+    known = [(found, against) for found, against in session.execute(query) if found and against is not None]
+    return [(float(found["low"]), tuple(each["name"] for each in against)) for found, against in known]
 
 
 def _that_count(material_id: int) -> tuple[ColumnElement[bool], ...]:

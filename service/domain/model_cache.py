@@ -19,6 +19,7 @@ from db.repositories import detections, friction_models, materials
 from service.domain.errors import NoModel
 from service.domain.recommended import AUTO, disagreeing, recommended
 from service.domain.stored_results import to_friction_model
+from slipcore.finding import severity_of
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -218,13 +219,15 @@ def _chosen(session: Session, material: str, material_id: int, models: Sequence[
 
 
 def _bound(session: Session, material_id: int) -> str:
-    """What a planner can rely on without a model, if anything."""
-    least = detections.least_friction(session, material_id)
-    if least is None or least <= 0.0:
+    """What is known without a model, if anything: by logs that nothing speaks against."""
+    bounds = detections.least_frictions(session, material_id)
+    sound = [least for least, names in bounds if all(severity_of(name) != "warning" for name in names)]
+    least = max(sound, default=0.0)
+    if least <= 0.0:
         return ""
     return (
-        f"; by the loads that its contacts bore friction is at least {least:.2g}, so that a normal force of "
-        f"{1.0 / least:.2g} times the tangential load holds"
+        f"; in the grasp that held best friction was at least {least:.2g}, by the load that its contact bore: the next "
+        "one may hold less"
     )
 
 

@@ -26,13 +26,16 @@ def no_slip(seen: Subject) -> Iterator[Finding]:
 
 def friction_of_surfaces(seen: Subject) -> Iterator[Finding]:
     """Friction that no surface shows on a sensor's skin: axes of force in different units look so."""
+    least = seen.limits.least_friction
     if seen.samples is not None and len(seen.samples) >= seen.limits.least_samples:
         friction = float(np.median(seen.samples.friction_coefficient))
-    elif seen.contact is not None and not seen.contact.is_bound:
-        friction = seen.contact.coefficient
-    else:
+    elif seen.contact is None:
         return
-    if not seen.limits.least_friction <= friction <= seen.limits.largest_friction:
+    elif seen.contact.is_bound:  # it may be more
+        friction, least = seen.contact.low, -np.inf
+    else:
+        friction = seen.contact.coefficient
+    if not least <= friction <= seen.limits.largest_friction:
         evidence = f"friction is {friction:.2g}; skins of sensors show 0.1 to 2 on nearly all that is held"
         yield Finding("odd friction", evidence, "make sure that all axes of force are in N")
 
