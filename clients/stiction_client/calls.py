@@ -10,7 +10,6 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from json import JSONDecodeError
 from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeVar
 from urllib.parse import quote
@@ -69,6 +68,9 @@ PAGE = 1000
 
 
 NOT_MODIFIED = 304
+
+NOT_JSON = (ValueError, RecursionError)
+"""What an answer raises that is no JSON, or nested too deeply, or has a number of thousands of digits."""
 
 OF_PROBLEMS = frozenset({"type", "title", "status", "detail", "instance", "name", "value", "allowed"})
 """Members of a problem that are arguments of their own, or say what is known: RFC 9457's, and this service's."""
@@ -186,6 +188,7 @@ def _listed(
     """Ask for a list, page after page, until there are enough."""
     found: list[T] = []
     cursor: str | None = None
+    known = set[str | None]()
     while True:
         limit = int(min(PAGE, most - len(found)))
         answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
@@ -193,6 +196,9 @@ def _listed(
         found += page
         if cursor is None or len(found) >= most:
             return found
+        if not page or cursor in known:
+            raise UnexpectedAnswer(f"the service's list at {path} does not end")
+        known.add(cursor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -429,7 +435,7 @@ def _type_of_problem(response: httpx.Response) -> str | None:
     """As the service names it; None of an answer that is none of its problems."""
     try:
         kind = str(response.json()["type"])
-    except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError):
+    except (*NOT_JSON, KeyError, TypeError):
         return None
     return kind if kind.startswith("/problems/") else None
 
@@ -437,9 +443,10 @@ def _type_of_problem(response: httpx.Response) -> str | None:
 def _retry_after(response: httpx.Response, default: float) -> float:
     """s that the service asks to wait; ``default`` where it doesn't say."""
     try:
-        return float(response.headers.get("retry-after", default))
+        seconds = float(response.headers.get("retry-after", default))
     except ValueError:  # a date, of which it is not known by which clock
         return default
+    return default if math.isnan(seconds) else seconds
 
 
 def _content(response: httpx.Response) -> Any:
@@ -449,7 +456,7 @@ def _content(response: httpx.Response) -> Any:
         return None
     try:
         return response.json()
-    except (JSONDecodeError, UnicodeDecodeError) as error:
+    except NOT_JSON as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is not JSON") from error
 
 
@@ -457,7 +464,7 @@ def _refuse(response: httpx.Response) -> NoReturn:
     try:
         problem = response.json()
         kind, detail = str(problem["type"]), str(problem.get("detail") or problem.get("title", ""))
-    except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
+    except (*NOT_JSON, KeyError, TypeError, AttributeError) as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is no problem+json") from error
     named = {name: None if problem.get(name) is None else str(problem[name]) for name in ("name", "value", "allowed")}
     facts = {name: value for name, value in problem.items() if name not in OF_PROBLEMS}

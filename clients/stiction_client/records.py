@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
+from stiction_client import recorded
 from stiction_client.errors import JobCancelled, JobFailed, JobRefused
 from stiction_client.model import FrictionModel
 
@@ -221,8 +222,13 @@ class FrictionAnswer:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
-        """The lookup in the service's answer."""
-        return cls(**_values(cls, record) | {"notes": tuple(record.get("notes", ()))})
+        """The lookup in the service's answer; raises ``ValueError`` for numbers that no friction has."""
+        told = _values(cls, record) | {"notes": tuple(record.get("notes", ()))}
+        for name in ("friction_coefficient", "tangential_velocity", "normal_force"):
+            told[name] = recorded.number(name, told[name], least=0.0)
+        told["mean"] = recorded.number("mean", told["mean"])
+        told["within_domain"] = recorded.truth("within_domain", told["within_domain"])
+        return cls(**told)
 
 
 @dataclass(frozen=True, slots=True)

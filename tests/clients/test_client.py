@@ -403,7 +403,9 @@ def test_a_busy_service_is_asked_again(
     assert (len(server.requests), refusal.value.status) == (3, status)
 
 
-@pytest.mark.parametrize(("asked", "waited"), [("0.004", 0.004), ("-1", 0.0), ("Sun, 22 Nov 2026 08:49:37 GMT", 1e-6)])
+@pytest.mark.parametrize(
+    ("asked", "waited"), [("0.004", 0.004), ("-1", 0.0), ("nan", 1e-6), ("Sun, 22 Nov 2026 08:49:37 GMT", 1e-6)]
+)
 @pytest.mark.usefixtures("quick")
 def test_a_busy_service_is_left_alone_as_long_as_it_asks(asked: str, waited: float) -> None:
     call = calls.material("paper")
@@ -656,3 +658,37 @@ def test_who_waits_for_a_job_is_given_the_time_for_it(answers: SimpleNamespace) 
     wait = float(asked[0].url.params["wait"])
     assert wait == pytest.approx(1.0, rel=0, abs=0.1)
     assert [each.extensions["timeout"]["read"] for each in asked] == [0.5 + wait, 0.5]
+
+
+@pytest.mark.parametrize(
+    "body", ["[" * 200_000, '{"items": ' + "9" * 5000 + "}", "no JSON"], ids=["nested", "long", "no"]
+)
+def test_what_is_no_json_is_no_answer(ask: Ask, service: Service, body: str) -> None:
+    with pytest.raises(UnexpectedAnswer):
+        ask(service(httpx.Response(200, text=body)), "friction", "paper", 0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"friction_coefficient": float("nan")},
+        {"friction_coefficient": -3e9},
+        {"friction_coefficient": True},
+        {"mean": "x"},
+        {"within_domain": "no"},
+        {"normal_force": None},
+    ],
+)
+def test_an_answer_that_is_no_friction_is_refused(
+    ask: Ask, service: Service, answers: SimpleNamespace, change: dict[str, Any]
+) -> None:
+    """A planner divides by it."""
+    with pytest.raises(UnexpectedAnswer, match=next(iter(change))):
+        ask(service(httpx.Response(200, text=json.dumps(answers.friction | change))), "friction", "paper", 0.0, 0.1)
+
+
+@pytest.mark.parametrize("items", [0, 1])
+def test_a_list_that_does_not_end_is_left(ask: Ask, service: Service, answers: SimpleNamespace, items: int) -> None:
+    pages = [{"items": [answers.material] * items, "next": "again"} for _ in range(3)]
+    with pytest.raises(UnexpectedAnswer, match="does not end"):
+        ask(service(*pages), "materials")
