@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 
@@ -15,6 +16,11 @@ logger = logging.getLogger(__name__)
 
 WATCH_SECONDS = 0.2
 """s between two looks at what a job has taken."""
+
+STILL_SECONDS = 600.0
+"""s in which a worker process that has a job takes no CPU at all, after which it hangs: what else it may wait for it
+tries again every few seconds.
+"""
 
 
 class ProcessExecutor:
@@ -44,7 +50,7 @@ class ProcessExecutor:
                 return
 
     async def run(self, claim: Claim) -> None:
-        """Do one job; raises ``WorkerDied``, and ``LimitReached`` where it took too long."""
+        """Do one job; raises ``WorkerDied``, also where it hung, and ``LimitReached`` where it took too long."""
         watching = asyncio.create_task(self._end_at_limit())
         died: BrokenProcessPool | None = None
         try:
@@ -54,21 +60,29 @@ class ProcessExecutor:
         finally:
             is_over = watching.done()
             watching.cancel()
-        if is_over:  # the process is gone, even if the job was done at that very moment
+        if is_over and watching.result():  # the process is gone, even if the job was done at that very moment
             raise LimitReached(f"more than {self._cpu_seconds:g} s of CPU (STICTION_JOB_CPU_SECONDS)") from died
-        if died is not None:
+        if is_over or died is not None:
             raise WorkerDied from died
 
-    async def _end_at_limit(self) -> None:
-        """End the worker process once it has taken the CPU time that a job may."""
+    async def _end_at_limit(self) -> bool:
+        """End the worker process once it has taken the CPU time that a job may, or hangs; tells whether it took it."""
         worker_id = spawned.process_id(self._pool)
-        begin = limits.cpu_seconds(worker_id) if worker_id is not None else None
+        begin = last = limits.cpu_seconds(worker_id) if worker_id is not None else None
+        moved = time.monotonic()
         while True:
             await asyncio.sleep(WATCH_SECONDS)
             now = limits.cpu_seconds(worker_id) if worker_id is not None else None
-            if begin is not None and now is not None and now - begin > self._cpu_seconds:
+            if begin is None or now is None:
+                continue
+            if now != last:
+                last, moved = now, time.monotonic()
+            is_still = time.monotonic() - moved > STILL_SECONDS
+            if is_still:
+                logger.warning("worker process %s has hung for %g s, and is ended", worker_id, STILL_SECONDS)
+            if is_still or now - begin > self._cpu_seconds:
                 self.kill()
-                return
+                return not is_still
 
     def kill(self) -> None:
         """End the worker process at once."""

@@ -20,7 +20,7 @@ from db.records import Claim, Gel, NewGraspLog
 from db.repositories import grasp_logs, jobs, runners, sensors
 from db.tables import GraspLogRow
 from service.jobs import pipeline, process_executor, worker
-from service.jobs.executor import LimitReached
+from service.jobs.executor import LimitReached, WorkerDied
 from service.processes import limits
 from service.settings import Settings
 from slipcore import GraspLog
@@ -122,6 +122,24 @@ def spend(seconds: float) -> None:
         pass
 
 
+def test_a_worker_that_hangs_is_ended_and_its_job_tried_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Without taking CPU, as one that is stopped or waits for a disk that is away: it had held its job for ever."""
+
+    async def run() -> None:
+        monkeypatch.setattr(worker, "warm_up", partial(spend, 0.0))
+        monkeypatch.setattr(worker, "run_job", hang_on_job)
+        monkeypatch.setattr(process_executor, "STILL_SECONDS", 1.0)
+        executor = process_executor.ProcessExecutor(worker.StoreConfig("sqlite:///x", tmp_path), 60.0)
+        await executor.start()
+        try:
+            with pytest.raises(WorkerDied):
+                await executor.run(Claim("job", "runner"))
+        finally:
+            await executor.close()
+
+    asyncio.run(run())
+
+
 def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -141,6 +159,10 @@ def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
 
     asyncio.run(run())
     assert limits.cpu_seconds(2**22 + 1) is None
+
+
+def hang_on_job(_: worker.StoreConfig, _claim: Claim) -> None:
+    time.sleep(60.0)
 
 
 def spend_on_job(_: worker.StoreConfig, claim: Claim) -> None:
