@@ -105,7 +105,7 @@ def small_logs(count: int) -> Iterator[bytes]:
     assert log.force is not None
     generator = np.random.default_rng(1)
     for _ in range(count):
-        force = log.force + generator.normal(0.0, 1e-6, log.force.shape)
+        force = log.force + generator.normal(0.0, 2e-4, log.force.shape)
         yield encode(replace(log, force=force, normal=None, truth=None))
 
 

@@ -317,6 +317,6 @@ def contents() -> Callable[[int], list[bytes]]:
     def noisy(seed: int) -> bytes:
         rng = np.random.default_rng(seed)
         moved = displacement + rng.normal(0.0, 1e-7, displacement.shape)
-        return encode(replace(grasp, displacement=moved, force=force + rng.normal(0.0, 1e-6, force.shape)))
+        return encode(replace(grasp, displacement=moved, force=force + rng.normal(0.0, 2e-4, force.shape)))
 
     return lambda count: [noisy(seed) for seed in range(count)]
