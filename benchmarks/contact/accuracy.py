@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from benchmarks.pages import save
 from slipcore.contact import reference
 from slipcore.contact.effects import LoadPath, SensorSampling, Viscoelasticity
 from slipcore.contact.elasticity.grid import Grid
@@ -360,14 +361,14 @@ def main() -> None:
         kept = [entry for entry in measured if isinstance(entry, Kept)]
         records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
         (options.output / "contact_accuracy.json").write_text(json.dumps(records, indent=1))
-        curves(points).savefig(options.output / "contact_accuracy.png", dpi=100)
+        save(curves(points), options.output / "contact_accuracy.png")
         print(table(points), request_table(kept), sep="\n\n")
     if "steps" in options.parts:
         stepped = list(load_steps(options.stepped))
         (options.output / "contact_accuracy_steps.json").write_text(
             json.dumps([asdict(entry) for entry in stepped], indent=1)
         )
-        step_curves(stepped).savefig(options.output / "contact_accuracy_steps.png", dpi=100)
+        save(step_curves(stepped), options.output / "contact_accuracy_steps.png")
         print(step_table(stepped), order_table(stepped), sep="\n\n")
 
 

@@ -326,7 +326,7 @@ class AccuracyDefaults(Options):
     usual_order: Annotated[float, Option(0.5, 3.0, "-", "random scenes")] = 1.5
     """Of displacement and force in the cell size."""
     usual_ratio_order: Annotated[float, Option(0.5, 3.0, "-", "random scenes: 1.0 to 1.7, by twice as fine grids")] = (
-        1.25
+        1.4
     )
     """The same of the stick ratio."""
     step_order: Annotated[float, Option(0.5, 2.0, "-", "accuracy-contact.md: 1.5 to 1.9")] = 1.5

@@ -1,7 +1,9 @@
 """Random requests: what is counted, what is kept, what is ended."""
 
+import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -14,6 +16,8 @@ from benchmarks.contact.random_requests import (
     TooLong,
     budget_request,
     budget_table,
+    expected_work,
+    kinds_of,
     request,
     requests,
     scene_of,
@@ -23,6 +27,7 @@ from benchmarks.contact.random_requests import (
 )
 from slipcore.contact.errors import InfeasibleLoad, OutOfReach
 from slipcore.contact.plan.plan import Plan
+from slipcore.contact.tiers import requests as runs
 from slipcore.contact.tiers.accuracy import Difference, Refined
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.frames import GraspLog
@@ -38,12 +43,14 @@ def test_estimates_are_counted_within_a_factor_of_three_and_below_a_third() -> N
         replace(ANSWERED, seed=3, kinds=(), became="refused"),
         replace(ANSWERED, seed=4, became="infeasible"),
     ]
-    whole, layered = table(made).splitlines()[2:]
-    assert whole == "| all | 4 | 3 | 1 | 0 | 67 % | 33 % | 33 % | 2.0 | 1.0 |"
-    assert layered == "| FiniteLayer | 2 | 2 | 0 | 0 | 100 % | 50 % | 0 % | 3.2 | 1.0 |"
+    whole, layered = table(made, range(5)).splitlines()[2:]
+    assert whole == "| all | 5 | 4 | 3 | 1 | 0 | 67 % | 33 % | 33 % | 2.0 | 1.0 |"
+    assert layered == "| FiniteLayer | 0 | 2 | 2 | 0 | 0 | 100 % | 50 % | 0 % | 3.2 | 1.0 |"
 
 
-def test_requests_go_on_where_they_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_requests_begin_with_the_cheapest_and_go_on_where_they_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     asked: list[int] = []
 
     def counted(seed: int, _: float) -> RandomRequest:
@@ -51,9 +58,10 @@ def test_requests_go_on_where_they_ended(monkeypatch: pytest.MonkeyPatch, tmp_pa
         return replace(ANSWERED, seed=seed)
 
     monkeypatch.setattr(random_requests, "request", counted)
+    monkeypatch.setattr(random_requests, "expected_work", lambda seed: -seed)
     requests(tmp_path / "requests.json", range(3), 1.0)
     made = requests(tmp_path / "requests.json", range(1, 5), 1.0)
-    assert asked == [0, 1, 2, 3, 4]
+    assert asked == [2, 1, 0, 4, 3]
     assert {entry.seed for entry in made} == {1, 2, 3, 4}
     assert ANSWERED in requests(tmp_path / "requests.json", range(5), 1.0)
 
@@ -70,16 +78,30 @@ def test_refused_and_long_scenes_are_counted_as_such(monkeypatch: pytest.MonkeyP
         until(-np.inf)(0.5)
 
 
-@pytest.mark.parametrize(("cells", "finer"), [(20, 80), (34, 100), (50, 100), (94, 188)])
+@pytest.mark.parametrize(
+    ("cells", "coupled", "finer"),
+    [(20, False, 80), (50, False, 150), (60, False, 150), (94, False, 188), (20, True, 80), (34, True, 100)],
+)
 def test_the_truth_is_on_a_finer_grid_in_half_the_steps(
-    monkeypatch: pytest.MonkeyPatch, cells: int, finer: int
+    monkeypatch: pytest.MonkeyPatch, cells: int, coupled: bool, finer: int
 ) -> None:
     ran: list[Fidelity] = []
     monkeypatch.setattr(random_requests, "run", lambda _, fidelity, __: ran.append(fidelity))
     monkeypatch.setattr(random_requests, "difference", lambda *_: Difference(0.1, 0.2, 0.0))
     found = Refined(cast("GraspLog", None), Fidelity(cells, 2, 1e-3), Difference(0.1, 0.1, 0.1), 1.0)
-    assert true_error(cast("Plan", None), found, lambda _: None) == 0.2
+    assert (
+        true_error(cast("Plan", SimpleNamespace(problem=SimpleNamespace(coupled=coupled))), found, lambda _: None)
+        == 0.2
+    )
     assert ran == [Fidelity(finer, 4, 1e-3)]
+
+
+def test_a_scene_should_cost_more_with_the_effects_that_take_iterations() -> None:
+    plain = min(range(20), key=expected_work)
+    assert not {"NormalTangentialCoupling", "VelocityFriction", "long"} & set(kinds_of(plain))
+    dearest = max(range(20), key=expected_work)
+    assert "NormalTangentialCoupling" in kinds_of(dearest)
+    assert expected_work(dearest) > 10.0 * expected_work(plain)
 
 
 def test_every_eighth_scene_is_held_for_longer() -> None:
@@ -96,3 +118,17 @@ def test_budgets_are_counted_by_what_of_them_is_used(monkeypatch: pytest.MonkeyP
     ):
         monkeypatch.setattr(random_requests, "simulate_to", lambda *_, error=error, **__: (_ for _ in ()).throw(error))
         assert budget_request(0, 4.0) == expected
+
+
+def test_budgets_run_by_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a log in which the other programs of a machine take up all of its time."""
+
+    def takes_long(*_: object, **__: object) -> Refined:
+        clock = runs.Runs(1e-3, 1.0, lambda _: None)
+        time.sleep(0.3)
+        return Refined(cast("GraspLog", None), Fidelity(20), Difference(0.1, 0.1, 0.1), clock.spent)
+
+    monkeypatch.setattr(random_requests, "simulate_to", takes_long)
+    made = budget_request(0, 1.0)
+    assert made is not None
+    assert made.used < 0.2
