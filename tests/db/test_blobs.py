@@ -221,3 +221,12 @@ def test_a_disk_that_is_full_at_the_last_bytes_leaves_nothing(
     with pytest.raises(StorageUnavailable, match="No space left"):
         upload()
     assert files(tmp_path) == []
+
+
+def test_a_store_makes_its_folder_and_finds_it_again(tmp_path: Path) -> None:
+    folder = tmp_path / "of the lab" / "blobs of today"
+    BlobStore(folder)
+    made = {path for path in tmp_path.rglob("*") if path.is_dir()}
+    assert folder in made
+    BlobStore(folder)
+    assert {path for path in tmp_path.rglob("*") if path.is_dir()} == made

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth, InvalidInput
+from slipcore.defaults import LIMITS
 from slipcore.frames import Frames, check_element_area, check_frame, check_normal, check_pose, check_position
 
 SHAPE = (4, 3, 5)
@@ -377,3 +378,10 @@ def test_frames_that_are_no_log_are_refused(fields: dict[str, Any]) -> None:
         without.take(slice(1))
     with pytest.raises(InvalidInput, match="time is"):
         without.take(np.array([2, 1]))
+
+
+@pytest.mark.parametrize("bound", [LIMITS.gripper_deviation, LIMITS.gripper_force])
+def test_a_deviation_at_either_end_of_its_range_is_taken(fields: dict[str, Any], bound: float) -> None:
+    assert GraspLog(**fields | {"gripper_force_deviation": bound}).gripper_force_deviation == bound
+    beyond = bound * (1.01 if bound == LIMITS.gripper_force else 0.99)
+    refused(fields, "gripper_force_deviation", gripper_force_deviation=beyond)

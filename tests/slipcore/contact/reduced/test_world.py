@@ -245,3 +245,15 @@ def test_a_step_that_cannot_be_is_refused_by_name() -> None:
             reduced.step(world, state, command, Load(mass, 1.0), duration)
     with pytest.raises(InvalidInput, match="supports"):
         Load(MASS, 1.5)
+
+
+def test_a_world_is_observed_as_it_is_unless_its_sensor_has_noise() -> None:
+    seen, noisy = [], []
+    for seed in range(2):
+        generator = np.random.default_rng(seed)
+        plain, world = world_of(), world_of(marker_noise=1e-6, force_noise=2e-3)
+        seen.append(reduced.observe(plain, reduced.init(plain, FORCE), generator=generator))
+        noisy.append(reduced.observe(world, reduced.init(world, FORCE), generator=generator))
+    for name in ("displacement", "force"):
+        np.testing.assert_array_equal(getattr(seen[0], name), getattr(seen[1], name))
+        assert (getattr(noisy[0], name) != getattr(noisy[1], name)).any()
