@@ -680,6 +680,12 @@ class CheckOptions(Options):
     """Elements beyond that from which they tell the sensor's zero during a grasp."""
     normal_lean: Annotated[float, Option(0.0, 1.0, "-", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
     """Sine of the largest angle between the mean normal and that of the surface."""
+    gripper_share: Annotated[float, Option(0.0, 10.0, "-", "resultants of Tac3D part from their sum by 3 to 7 %")] = (
+        0.15
+    )
+    """Share by which the sum of normal forces may differ from the gripper's force, in the median."""
+    gripper_trend: Annotated[float, Option(0.0, 10.0, "-", "half of what friction differs by between places")] = 0.08
+    """Share by which their ratio may change from the first to the last fifth of the frames held."""
     contact_likeness: Annotated[float, Option(0.0, 1.0, "-", "an offset is alike everywhere, about 0")] = 0.5
     """Correlation over elements of forces at rest with those of the grasp, above which they are a contact's."""
     least_held: Annotated[int, Option(3, 1000000, "frames", "a line and what it leaves")] = 8

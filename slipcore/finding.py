@@ -28,6 +28,7 @@ SEVERITIES: dict[str, Severity] = {
     "zero offset": "warning",
     "zero drift": "warning",
     "leaning normals": "warning",
+    "gripper's force differs": "warning",
     "leaning forces": "warning",
     "turned axes": "warning",
     "sideways force without load": "warning",

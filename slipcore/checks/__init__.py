@@ -35,6 +35,7 @@ CHECKS: tuple[Check, ...] = (
     force_checks.zero_offset,
     force_checks.zero_drift,
     force_checks.leaning_normals,
+    force_checks.gripper_force,
     force_checks.force_frame,
     contact.load_free_tangential_force,
     contact.moving_contact,

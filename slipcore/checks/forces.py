@@ -77,6 +77,31 @@ def _before_and_after(seen: Subject, touched: BoolArray) -> tuple[BoolArray, Boo
     return touched, rest & (moment < begin), rest & (moment > end), "that it touches"
 
 
+def gripper_force(seen: Subject) -> Iterator[Finding]:
+    """Normal forces that add up to another sum than the gripper reports, or that part from it during the grasp."""
+    force, reported = _measured(seen), seen.log.gripper_force
+    if force is None or reported is None:
+        return
+    held = np.flatnonzero(seen.held & (reported > 0.0))
+    if len(held) < seen.limits.least_held:
+        return
+    ratio, fifth = seen.total[held] / reported[held], max(len(held) // 5, 2)
+    unsure = 3.0 * (seen.log.gripper_force_deviation or 0.0) / float(np.median(reported[held]))
+    told, begin, end = (float(np.median(each)) for each in (ratio, ratio[:fifth], ratio[-fifth:]))
+    if max(told, 1.0 / told) - 1.0 > max(seen.limits.gripper_share, unsure):
+        evidence = f"the normal forces of all elements add up to {told:.2g} of what the gripper reports"
+        remedy = "make sure of N on all axes (kgf: 0.1; mN: 1000), and that it is this finger's force"
+        yield Finding("gripper's force differs", evidence, remedy)
+    elif max(end / begin, begin / end) - 1.0 > max(seen.limits.gripper_trend, unsure):
+        evidence = (
+            f"the normal forces of all elements add up to {begin:.2g} of what the gripper reports as the grasp begins, "
+            f"and to {end:.2g} as it ends"
+        )
+        yield Finding(
+            "gripper's force differs", evidence, "the sensor creeps: grasp for a shorter time, or calibrate it"
+        )
+
+
 def leaning_normals(seen: Subject) -> Iterator[Finding]:
     """Normals that lean against the surface that the elements lie on, in all frames: friction splits forces by them."""
     log = seen.log

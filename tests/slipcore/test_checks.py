@@ -136,6 +136,13 @@ def drifting(log: GraspLog, *drift: float) -> GraspLog:
     return with_force(log, np.asarray(log.force) + share * np.array(drift))
 
 
+def gripped(log: GraspLog, factor: float = 1.0, creep: float = 0.0) -> GraspLog:
+    """With the gripper's true force, and normal forces times a factor of which a part is lost within a second."""
+    force = np.array(log.force)
+    force[..., 2] *= factor * (1.0 - creep * (1.0 - np.exp(-(log.time - log.time[0]))))[:, None, None]
+    return replace(log, force=force, gripper_force=pressing(log).sum(axis=(1, 2)), gripper_force_deviation=0.02)
+
+
 def with_leaning_normals(log: GraspLog, degrees: float) -> GraspLog:
     """Normals in a frame that is turned about y against that of the markers."""
     assert log.normal is not None
@@ -155,6 +162,7 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "element area": lambda log: replace(log, element_area=10.0 * log.element_area),
     "zero offset": lambda log: with_offset(log, 0.005, 0.0, 0.0),
     "zero drift": lambda log: drifting(log, 0.005, 0.0, 0.0),
+    "gripper's force differs": lambda log: gripped(log, creep=0.2),
     "leaning normals": lambda log: with_leaning_normals(log, 3.0),
     "odd friction": lambda log: with_force(log, np.asarray(log.force) * np.array([9.81, 9.81, 1.0])),
     "leaning forces": lambda log: leaning(log, 8.0),
@@ -272,6 +280,18 @@ def test_normals_of_the_deformed_shape_lean_nowhere(long_ramp: GraspLog) -> None
     shaped = replace(long_ramp, normal=normals_of(replace(long_ramp, normal=None)))
     assert "leaning normals" not in names(shaped)
     assert "leaning normals" not in names(shaped.take(slice(30, None)))
+
+
+@pytest.mark.parametrize(
+    ("factor", "creep", "is_found"),
+    [(1.0, 0.0, False), (1.05, 0.0, False), (0.7, 0.0, True), (1.3, 0.0, True), (0.102, 0.0, True), (1.0, 0.2, True)],
+)
+def test_forces_that_the_gripper_contradicts_are_found(
+    long_ramp: GraspLog, factor: float, creep: float, is_found: bool
+) -> None:
+    log = gripped(long_ramp, factor, creep)
+    assert ("gripper's force differs" in names(log)) == is_found
+    assert "gripper's force differs" not in names(replace(log, gripper_force_deviation=100.0))
 
 
 @pytest.mark.parametrize("gains", [(9.81, 9.81, 1.0), (1.0, 1.0, 9.81)])
