@@ -71,6 +71,12 @@ class NoiseDefaults(Options):
     """No finer one is distinguished from none."""
     field_bend: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes: 0.003 around the rim of a cup")] = 0.004
     """How much of its size a field of displacement may bend by without noise."""
+    stale_time: Annotated[
+        float, Option(0.0, 1e3, "s", "forces at 10 Hz beside markers at 30 fps repeat for 0.07 s")
+    ] = 0.1
+    """From which on noisy forces are not believed that stay the same to the last bit while markers move."""
+    stale_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "one in 10⁶ of white noise")] = 5.0
+    """By which a sum over all markers must have changed meanwhile for these to have moved."""
     lasting_told: Annotated[
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
@@ -103,6 +109,26 @@ class SmoothingDefaults(Options):
     """Bend of noise, over that of white noise, from which it is not smoothed."""
     widest: Annotated[float, Option(0.1, 100.0, "elements", "0.2 % of a field's finest waves is left")] = 1.6
     """No wider kernel is made undone."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContradictionDefaults(Options):
+    """When forces of a whole log do not go with its displacement (``detection/contradicting_forces.py``)."""
+
+    least_frames: Annotated[int, Option(3, 1_000_000, "frames", "fewer hold no press")] = 12
+    """Of a log that is looked at."""
+    least_step: Annotated[float, Option(1e-6, 1.0, "s", "finer than any lag that matters")] = 1.0 / 60.0
+    """In which sums are compared, whatever the frame rate."""
+    most_steps: Annotated[float, Option(1.0, 1e3, "-", "half of the frames dropped, and a little")] = 4.0
+    """For each frame; a log with more is mostly gaps."""
+    longest_lag: Annotated[float, Option(0.0, 60.0, "s", "two clocks are further apart, or not at all")] = 1.0
+    """By which forces may be late."""
+    largest_left: Annotated[float, Option(0.0, 1.0, "-", "0.21 at most on tuning scenes with late forces")] = 0.3
+    """Share of the change of forces that displacement may leave unexplained once a lag is taken out."""
+    clearly: Annotated[float, Option(0.0, 1.0, "-", "0.3 at most with a fault on tuning scenes, 0.95 without")] = 0.5
+    """Of what is unexplained, the most that taking out a lag or crosstalk may leave."""
+    least_crosstalk: Annotated[float, Option(0.0, 1.0, "-", "normals that err by 3°; less costs nothing")] = 0.05
+    """From which on it is taken out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -226,12 +252,13 @@ NORMAL_95 = 1.959963984540054
 """Φ⁻¹(0.975): half-width of the 95 % interval of a normal distribution in standard deviations."""
 NOISE = NoiseDefaults()
 SMOOTHING = SmoothingDefaults()
+CONTRADICTION = ContradictionDefaults()
 NUMERICS = NumericsDefaults()
 MARKERS = MarkerDefaults()
 SATURATION = SaturationDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
-TABLES = (NOISE, SMOOTHING, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
+TABLES = (NOISE, SMOOTHING, CONTRADICTION, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
 """What is not an option of a method."""
 
 

@@ -20,6 +20,8 @@ SEVERITIES: dict[str, Severity] = {
     "force too large": "warning",
     "force pulls": "warning",
     "forces not believed": "note",
+    "late forces": "warning",
+    "crosstalk": "warning",
     "rounded": "note",
     "lasting noise": "note",
     "smoothed": "note",

@@ -20,6 +20,7 @@ WHOLE_TABLES = {
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",
+    "slipcore.CONTRADICTION": "needs logs with faulty forces; tests/slipcore/detection has them",
     "slipcore.NOISE": "compiled kernels hold it fixed",
     "slipcore.NUMERICS": "compiled kernels hold it fixed",
     "slipcore.contact.PROJECTION": "compiled kernels hold it fixed",

@@ -2,7 +2,8 @@
 
 Each fault is put into scenes that are observed with 1 µm and 2 mN of white noise, by default those of an independent
 solver, which nothing was chosen on. F1 of method "filter" with forces, from displacement alone and with the object's
-pose, and of the paper's method with forces beside it. Writes detector_faults.json.
+pose, and of the paper's method with forces beside it; and under each noise what forces that contradict the motion cost
+on the set ``scoring``. Writes detector_faults.json.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from benchmarks.detector.accuracy import FORCE_NOISE, score
+from benchmarks.detector.accuracy import FORCE_NOISE, NOISES, score
 from benchmarks.detector.scenes import PITCH, Case, cases, observed
 from benchmarks.pages import options, picture_folder, table, write
 from service.slip_benchmark.faults import (
@@ -97,6 +98,16 @@ CALIBRATED: dict[str, dict[str, float]] = {
 }
 """Faults of which the detector may be told, and what: the noise, m, or the kernel, m, and the noise after it."""
 
+CONTRADICTING = (
+    "none",
+    "crosstalk of 10 %",
+    "crosstalk of 30 %",
+    "forces 0.1 s late",
+    "forces 0.5 s late",
+    "forces freeze at half of the time",
+)
+"""Faults of forces that the motion contradicts."""
+
 COLUMNS = (
     "fault",
     "filter, forces",
@@ -120,6 +131,19 @@ def measure(scenes: list[Case], faults: dict[str, Fault]) -> Iterator[Cost]:
                 yield Cost(
                     f"{name}, {row}", **judged, strain_rate=mean_f1(scenes, fault, "force", "strain_rate", judge=judge)
                 )
+
+
+def contradicted(scenes: Sequence[Case]) -> dict[str, dict[float, float]]:
+    """Mean F1 from displacement alone, and with forces that have a fault, under each noise, m."""
+    found = {"displacement alone": {noise: _under(scenes, "none", "displacement", noise) for noise in NOISES}}
+    for name in CONTRADICTING:
+        found[name] = {noise: _under(scenes, name, "force", noise) for noise in NOISES}
+    return found
+
+
+def _under(scenes: Sequence[Case], fault: str, inputs: str, noise: float) -> float:
+    of_force = FORCE_NOISE if noise else 0.0
+    return mean_f1(scenes, FORCE_FAULTS[fault], inputs, "filter", noise=(noise, of_force))
 
 
 def _filled(case: Case, log: GraspLog, history: SlipHistory) -> float:
@@ -165,9 +189,13 @@ def main() -> None:
         raise SystemExit(f"no scenes of the set {arguments.scenes} are there")
     picture_folder(arguments)
     costs = {"faults": list(measure(slipping, FAULTS)), "force faults": list(measure(slipping, FORCE_FAULTS))}
+    found = contradicted([case for case in cases("scoring") if not case.name.startswith("press")])
     made = {name: table(COLUMNS, [tuple(asdict(row).values()) for row in rows]) for name, rows in costs.items()}
+    columns = ("forces", *(f"{1e6 * noise:g} µm" for noise in NOISES))
+    made["contradicting forces"] = table(columns, [(name, *row.values()) for name, row in found.items()])
     print("\n\n".join(made.values()))
-    numbers = {name: [asdict(row) for row in rows] for name, rows in costs.items()}
+    numbers: dict[str, object] = {name: [asdict(row) for row in rows] for name, rows in costs.items()}
+    numbers["contradicting forces"] = {name: list(row.values()) for name, row in found.items()}
     write(numbers, made, arguments, "detector_faults.json")
 
 

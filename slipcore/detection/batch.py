@@ -8,6 +8,7 @@ import numpy as np
 
 from slipcore.calibration.model import SensorModel
 from slipcore.defaults import DEFAULT_METHOD, FORCES_METHOD, MOST_LOOKAHEAD
+from slipcore.detection.contradicting_forces import agreeing
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.decision import apply_decision
@@ -32,17 +33,19 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Method "filter" sharpens what the
-    sensor smoothed, as far as the log's noise shows how widely, unless options give it. A log without displacement is
-    left to method "forces_only" where the default would see nothing. ``options`` are the method's, and
-    ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their
-    defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Forces that are clearly late, or
+    have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
+    smoothed, as far as the log's noise shows how widely, unless options give it. A log without displacement is left to
+    method "forces_only" where the default would see nothing. ``options`` are the method's, and ``kernel_width`` of
+    ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their defaults. Raises
+    ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
     if method == DEFAULT_METHOD and not log.has_displacement:
         method = FORCES_METHOD
     if sensor_model is not None:
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
+    log, mended = agreeing(log)
     kernel_width = options.pop("kernel_width", 0.0)
     estimated = {}
     if method == DEFAULT_METHOD:
@@ -51,7 +54,7 @@ def detect_slip(
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         history = history_of(log, state, checked_lookahead(lookahead))
-        history = replace(history, findings=history.findings + smoothing_found(estimated))
+        history = replace(history, findings=mended + history.findings + smoothing_found(estimated))
         return with_patches(log, history, kernel_width=kernel_width)
     smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
@@ -59,6 +62,7 @@ def detect_slip(
         if (settled := smoother.take(state, now)) is not None:
             settled_states.append(settled)
     history = collect_history([*settled_states, *smoother.rest()], state)
+    history = replace(history, findings=mended + history.findings)
     if not log.has_displacement:
         history = replace(history, velocity=np.full_like(history.velocity, np.nan))
     return with_patches(log, history, kernel_width=kernel_width)

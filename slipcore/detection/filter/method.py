@@ -10,11 +10,11 @@ from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
     COMMON,
+    DOUBTED_FRAMES,
     FORCE_FRAMES,
     LASTING,
     POSE,
     PROBABILITY,
-    PULLED_FRAMES,
     REFERENCE,
     ROWS,
     STICK_VARIANCE,
@@ -49,13 +49,14 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
 
 
 def findings(common: FloatArray) -> tuple[Finding, ...]:
-    """Forces by which the object pulls, and noise of markers that three frames do not show."""
-    found, frames, pulled = [], round(common[FORCE_FRAMES]), round(common[PULLED_FRAMES])
-    if pulled:
+    """Forces that are not believed, and noise of markers that three frames do not show."""
+    found, frames, doubted = [], round(common[FORCE_FRAMES]), round(common[DOUBTED_FRAMES])
+    if doubted:
         evidence = (
-            f"the object pulls in {pulled} of {frames} frames in which it touches; slip is found without them there"
+            f"the object pulls, or forces stand still while markers move, in {doubted} of {frames} frames in which it "
+            "touches; slip is found without them there"
         )
-        remedy = "give the force of the object on the sensor, in its frame"
+        remedy = "give the force of the object on the sensor, in its frame, as it is at the frame's time"
         found.append(Finding("forces not believed", evidence, remedy))
     if common[TOLD_STEP] > 0.0:
         evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"

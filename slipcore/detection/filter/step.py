@@ -13,13 +13,13 @@ from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
+    DOUBTED_FRAMES,
     END,
     FORCE_FRAMES,
     LASTING,
     ONSET,
     POSE,
     PROBABILITY,
-    PULLED_FRAMES,
     REFERENCE,
     SLIP_VARIANCE,
     SLIP_X,
@@ -49,13 +49,13 @@ def step_filter(
     has_force: bool,
 ) -> None:
     """Fill ``elements`` and ``common`` of the memory ``after``, and the decision, from the surface in the ``room``;
-    ``has_force``: whether there are forces, and they do not pull.
+    ``has_force``: whether there are forces to believe.
     """
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
-        after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
+        after.common[DOUBTED_FRAMES] += 0.0 if has_force else 1.0
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last says nothing
         after.elements[ONSET] = after.elements[END] = 0.0

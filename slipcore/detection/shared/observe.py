@@ -3,7 +3,7 @@
 import math
 
 from slipcore.compilation import compiled, unpack
-from slipcore.defaults import NOISE
+from slipcore.defaults import NOISE, SMOOTHING
 from slipcore.detection.shared.contact import TOUCH, ContactThreshold, find_contact, spatial_noise
 from slipcore.detection.shared.lasting_noise import OF_STEP, step_lasting
 from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace
@@ -11,13 +11,21 @@ from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
 from slipcore.surface.normals import split_forces, surface_normals
 
-SERIES = NOISE.series
+SERIES, _STALE, _MOVED, _LEAST_NOISE = (
+    NOISE.series,
+    NOISE.stale_time,
+    NOISE.stale_deviations,
+    SMOOTHING.least_force_noise,
+)
 
 
 @compiled(inline=True)
-def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
+def observe(
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
+) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
-    noise estimate. Whether there are forces, and they do not pull: an object cannot, and contact is then by shape.
+    noise estimate. Whether there are forces to believe: an object cannot pull, nor do forces stand still while markers
+    move. Otherwise contact is by shape.
     """
     normal, pressing, tangential, stays, noise = room.surface
     if frame.normal.size:
@@ -40,10 +48,11 @@ def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Me
         ContactThreshold(*unpack(sensor.touch_by_force, TOUCH)),
         ContactThreshold(*unpack(sensor.touch_by_shape, TOUCH)),
     )
-    pulls = frame.force.size > 0 and pulled(pressing, noise[1], by_force)
+    step_standing(sensor.position, last, frame, before.noise[2], noise, after.noise[2])
+    believed = after.noise[2, 3] < _STALE and not (frame.force.size > 0 and pulled(pressing, noise[1], by_force))
     if frame.contact.size:
         contact[:] = frame.contact
-    elif pulls:
+    elif not believed:
         indent(frame.displacement, room.weight)
         find_contact(room.weight, noise[0], was, by_shape, contact)
     else:
@@ -52,7 +61,43 @@ def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Me
     for i in range(n):
         for j in range(m):
             stays[i, j] = contact[i, j] and was[i, j]
-    return frame.force.size > 0 and not pulls
+    return frame.force.size > 0 and believed
+
+
+@compiled
+def step_standing(
+    position: FloatArray,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: FloatArray,
+    noise: FloatArray,
+    after: FloatArray,
+) -> None:
+    """Keep in the clock row ``after`` for how long forces have been the same to the last bit while markers moved, s,
+    and the sums of displacement and of its moment when forces last changed.
+
+    Markers have moved once a sum parts from that by ``NOISE.stale_deviations`` of its ``noise``. Those forces may stay
+    that are all 0, as a sensor sends them while nothing touches, or that showed no noise before.
+    """
+    stands = frame.force.size > 0 and last.force.size > 0 and same(last.force, frame.force) and frame.force.any()
+    stands = stands and (before[3] > 0.0 or noise[1] > _LEAST_NOISE)
+    n, m, _ = frame.displacement.shape
+    x = y = z = moment = lever = 0.0
+    for i in range(n):
+        for j in range(m):
+            rx, ry = position[i, j, 0] - position[n // 2, m // 2, 0], position[i, j, 1] - position[n // 2, m // 2, 1]
+            x += frame.displacement[i, j, 0]
+            y += frame.displacement[i, j, 1]
+            z += frame.displacement[i, j, 2]
+            moment += rx * frame.displacement[i, j, 1] - ry * frame.displacement[i, j, 0]
+            lever += rx * rx + ry * ry
+    if not stands:
+        after[3], after[4], after[5], after[6], after[7] = 0.0, x, y, z, moment
+        return
+    after[4:8] = before[4:8]
+    moved = max(abs(x - before[4]), abs(y - before[5]), abs(z - before[6])) > _MOVED * noise[0] * math.sqrt(n * m)
+    moved = moved or abs(moment - before[7]) > _MOVED * noise[0] * math.sqrt(lever)
+    after[3] = before[3] + frame.time - last.time if moved or before[3] > 0.0 else 0.0
 
 
 @compiled
@@ -85,7 +130,8 @@ def step_noise(
     marker coordinate, m, and of ``pressing``, NaN while unknown. ``series`` [2, k]: room for medians.
 
     Remembered in the first nine rows of [11, columns]: recent estimates of markers and of pressing; a clock (times of
-    the last two frames, and how many there were); then x, y and pressing of evenly chosen elements in each of these.
+    the last two frames, how many there were, and for how long forces have stood still); then x, y and pressing of
+    evenly chosen elements in each of these.
     """
     n, m = pressing.shape
     k = min(n * m, SERIES)

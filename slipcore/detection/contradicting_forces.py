@@ -1,0 +1,117 @@
+"""Forces of a whole log that do not go with its displacement: late ones, and normal force that leaks sideways.
+
+Summed over the lattice, forces on an elastic gel change as displacement does, whatever sticks or slips: along the
+normal ΔΣF = k ΔΣu, along the surface and about the normal likewise. How large k is, and how well that holds, differs
+from gel to gel. So forces are changed only where that makes the sums of this very log agree far better.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.defaults import CONTRADICTION
+from slipcore.finding import Finding
+from slipcore.frames import FloatArray, GraspLog
+
+NORMAL, ALONG, ABOUT = slice(2, 3), slice(0, 2), slice(3, 4)
+"""Components of the sums that have a stiffness of their own."""
+
+
+class Changes(NamedTuple):
+    """How sums over the lattice change from one ``step``, s, to the next: of ``displacement`` m and ``force`` N along
+    x, y, z, and their moment about z over the lattice's radius of gyration, [k, 4] each.
+    """
+
+    step: float
+    displacement: FloatArray
+    force: FloatArray
+
+
+def agreeing(log: GraspLog) -> tuple[GraspLog, tuple[Finding, ...]]:
+    """The log with forces that go with its displacement, and what was done for that: mostly the same, and nothing."""
+    if log.force is None or not log.has_displacement or len(log) < CONTRADICTION.least_frames:
+        return log, ()
+    found = []
+    if lag := lag_of_forces(changes_of(log)):
+        log = brought_forward(log, lag)
+        evidence = f"forces come {lag:.2f} s after the displacement that they go with; slip is found with both at once"
+        found.append(Finding("late forces", evidence, "give both the times at which they were measured"))
+    leak = crosstalk_of(changes_of(log))
+    if leak.any():
+        assert log.force is not None
+        force = log.force.copy()
+        force[..., :2] += leak * force[..., 2:]
+        log = replace(log, force=force)
+        evidence = f"{leak[0]:.2g} and {leak[1]:.2g} of the normal force appear along x and y without displacement"
+        found.append(Finding("crosstalk", f"{evidence}; slip is found without that", "calibrate the sensor"))
+    return log, tuple(found)
+
+
+def changes_of(log: GraspLog) -> Changes:
+    """How the log's sums change, in means over two steps of even length; empty where most of it is gaps."""
+    step = max(float(np.median(np.diff(log.time))), CONTRADICTION.least_step)
+    count = int((log.time[-1] - log.time[0]) / step) - 1
+    assert log.force is not None
+    if count > CONTRADICTION.most_steps * len(log):
+        return Changes(step, np.zeros((0, 4)), np.zeros((0, 4)))
+    middle = log.time[0] + step * np.arange(1, count + 1)
+    return Changes(step, *(_changes(log, field, middle, step) for field in (log.displacement, log.force)))
+
+
+def _changes(log: GraspLog, field: FloatArray, middle: FloatArray, step: float) -> FloatArray:
+    place = log.position[..., :2] - log.position[..., :2].mean(axis=(0, 1))
+    moment = np.tensordot(field[..., 1], place[..., 0]) - np.tensordot(field[..., 0], place[..., 1])
+    radius = np.sqrt((place**2).sum(axis=-1).mean())
+    sums = np.column_stack([field.sum(axis=(1, 2)), moment / radius])
+    areas = 0.5 * (sums[1:] + sums[:-1]) * np.diff(log.time)[:, None]
+    integral = np.vstack([np.zeros(4), np.cumsum(areas, axis=0)])
+    means = [np.interp(middle + step, log.time, each) - np.interp(middle - step, log.time, each) for each in integral.T]
+    return np.diff(np.transpose(means) / (2.0 * step), axis=0)
+
+
+def unexplained(displacement: FloatArray, force: FloatArray) -> float:
+    """Share of the changes of force [k, 4] N, squared, that no stiffness makes of those of displacement [k, 4] m."""
+    left = 0.0
+    for component in (NORMAL, ALONG, ABOUT):
+        moved, pushed = displacement[:, component].ravel(), force[:, component].ravel()
+        size = float(moved @ moved)
+        stiffness = max(float(moved @ pushed) / size, 0.0) if size > 0.0 else 0.0
+        left += float(((pushed - stiffness * moved) ** 2).sum())
+    total = float((force**2).sum())
+    return left / total if total > 0.0 else 0.0
+
+
+def lag_of_forces(changes: Changes) -> float:
+    """By how much forces come later than the displacement that they go with, s; 0 where that is not clear."""
+    step, displacement, force = changes
+    count = len(force)
+    most = min(round(CONTRADICTION.longest_lag / step), count // 3)
+    left = [unexplained(displacement[: count - lag], force[lag:]) for lag in range(most + 1)]
+    best = int(np.argmin(left))
+    clear = left[best] < CONTRADICTION.largest_left and left[best] < CONTRADICTION.clearly * left[0]
+    return step * best if clear else 0.0
+
+
+def brought_forward(log: GraspLog, lag: float) -> GraspLog:
+    """The log with the forces that came ``lag`` seconds later; at its end, where none came, the last ones stay."""
+    assert log.force is not None
+    then = np.searchsorted(0.5 * (log.time[1:] + log.time[:-1]), log.time + lag)
+    return replace(log, force=log.force[then])
+
+
+def crosstalk_of(changes: Changes) -> FloatArray:
+    """Share of the normal force that appears along x and along y without displacement, [2]; 0 where that is not clear.
+
+    Least squares of ΔΣF_t = k ΔΣu_t + c ΔF_N, against the same without c.
+    """
+    along, sideways = changes.displacement[:, ALONG].T.ravel(), changes.force[:, ALONG].T.ravel()
+    pressing, nothing = -changes.force[:, 2], np.zeros(len(changes.force))
+    columns = np.column_stack([along, np.r_[pressing, nothing], np.r_[nothing, pressing]])
+    found = np.linalg.lstsq(columns, sideways)[0]
+    left, without = (
+        float(((sideways - used @ np.linalg.lstsq(used, sideways)[0]) ** 2).sum()) for used in (columns, columns[:, :1])
+    )
+    leak: FloatArray = found[1:]
+    clear = np.hypot(*leak) > CONTRADICTION.least_crosstalk and left < CONTRADICTION.clearly * without
+    return leak if clear else np.zeros(2)
