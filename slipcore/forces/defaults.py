@@ -96,6 +96,8 @@ class SupportDefaults(Options):
     """Most rows by which a contact then grows or shrinks."""
     levels: Annotated[int, Option(0, 100, "levels", "an ellipse, a cone, a block and a stadium")] = 8
     """Of pressure at which the rim of a contact is tried to be cut, from a row less to a row more."""
+    least_probability: Annotated[float, Option(0.0, 1.0, "-", "less adds under a tenth to deviations")] = 1e-2
+    """Of a contact, in those of the most probable one, from which on forces by it count in deviations."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

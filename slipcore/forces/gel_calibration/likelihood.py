@@ -164,7 +164,7 @@ def _better(
     for _ in range(1 if seek == "support" else GEL_CALIBRATION.alternations):
         if seek == "both":
             prior = choose_prior(observation, data, nodes, support.ravel(), first=prior.smoothness)
-        before, support = support, better_support(observation, data, nodes, support, prior.smoothness)
+        before, support = support, better_support(observation, data, nodes, support, prior.smoothness)[0].support
         if (before == support).all():
             break
     return PressContact(support, prior)

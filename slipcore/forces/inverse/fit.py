@@ -65,13 +65,17 @@ class TractionFit:
     root: FloatArray
     prior_root: FloatArray
 
+    def mean(self, data: FloatArray) -> FloatArray:
+        """Mean tractions [3, j] given data [m], whether or not they pull."""
+        return np.asarray((self.operator @ data).reshape(3, -1))
+
     def traction(self, data: FloatArray) -> FloatArray:
         """The most probable tractions [3, j] that pull no more than ``FIT.tension`` allows, given data [m].
 
         A quadratic programme, solved by active sets: pressures below the bound are conditioned on lying at it, and
         freed again where they would push.
         """
-        mean = self.operator @ data
+        mean = self.mean(data).ravel()
         first = len(mean) * 2 // 3
         pressure = self.root[first:]
         excess = mean[first:] + FIT.tension * max(float(mean[first:].max()), 0.0)

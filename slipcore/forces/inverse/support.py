@@ -8,19 +8,28 @@ is found so; how much comes from a fit on that support.
 """
 
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
 from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.inverse.covariance import covariance_root, solve_root
-from slipcore.forces.inverse.fit import ObservationModel, condensed, fit, log_evidence
+from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, condensed, fit, log_evidence
 from slipcore.forces.inverse.prior import Smoothness
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
 STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_erosion, binary_closing)
 """How a contact may change: by one row of nodes at its rim, or over a gap."""
+
+
+class SupportCandidate(NamedTuple):
+    """A ``support`` [ny, nx], the log probability of data by it, and the prior of tractions that makes it largest."""
+
+    support: BoolArray
+    log_probability: float
+    prior: TractionPrior
 
 
 def relevant_nodes(observation: ObservationModel, data: FloatArray, candidates: BoolArray) -> BoolArray:
@@ -48,29 +57,36 @@ def relevant_nodes(observation: ObservationModel, data: FloatArray, candidates: 
 
 def better_support(
     observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
-) -> BoolArray:
-    """The support [ny, nx] that explains data [m] best, under priors of this shape, among those that grow, shrink or
-    close row by row from one, and those whose rim is then cut where pressures are.
+) -> list[SupportCandidate]:
+    """Supports that explain data [m] best, the most probable first and none much less probable than it, under priors
+    of this shape: among those that grow, shrink or close row by row from one, and those whose rim is then cut
+    where pressures are.
     """
     near = observation.within(binary_dilation(support).ravel(), data)
-    best, most = _most_probable([support], *near, nodes, shape)
+    judged = _judged([support], *near, nodes, shape)
+    best = judged[0]
     for _ in range(SUPPORT.steps):
-        others = [other for change in STEPS if (other := change(best)).any() and (other != best).any()]
-        better, found = _most_probable(others or [best], *near, nodes, shape)
-        if found <= most:
+        changed = [change(best.support) for change in STEPS]
+        others = [other for other in changed if other.any() and (other != best.support).any()]
+        judged += _judged(others, *near, nodes, shape)
+        before, best = best, max(judged, key=_probability)
+        if best is before:
             break
-        best, most = better, found
-        near = observation.within(binary_dilation(best).ravel(), data)
-    better, found = _most_probable([*cut(*near, nodes, best, shape)] or [best], *near, nodes, shape)
-    return better if found > most else best
+        near = observation.within(binary_dilation(best.support).ravel(), data)
+    judged += _judged([*cut(*near, nodes, best.support, shape)], *near, nodes, shape)
+    different = {each.support.tobytes(): each for each in judged}.values()
+    least = max(map(_probability, judged)) + np.log(SUPPORT.least_probability)
+    return sorted((each for each in different if each.log_probability >= least), key=_probability, reverse=True)
 
 
-def _most_probable(
+def _judged(
     supports: list[BoolArray], observation: ObservationModel, data: FloatArray, nodes: Nodes, shape: Smoothness
-) -> tuple[BoolArray, float]:
-    """That of some supports which data speak for most, and their log probability by it."""
-    evidence = [log_evidence(observation, data, nodes, support.ravel(), shape)[0] for support in supports]
-    return supports[int(np.argmax(evidence))], max(evidence)
+) -> list[SupportCandidate]:
+    return [SupportCandidate(each, *log_evidence(observation, data, nodes, each.ravel(), shape)) for each in supports]
+
+
+def _probability(candidate: SupportCandidate) -> float:
+    return candidate.log_probability
 
 
 def cut(
@@ -82,7 +98,7 @@ def cut(
     least, wide = binary_erosion(support), binary_dilation(support)
     of_wide = fit(observation, nodes, wide.ravel(), log_evidence(observation, data, nodes, wide.ravel(), shape)[1])
     pressure = np.full(support.shape, -np.inf)
-    pressure[wide] = (of_wide.operator @ data)[2 * int(wide.sum()) :]
+    pressure[wide] = of_wide.mean(data)[2]
     rim = np.flatnonzero(wide & ~least)
     strongest = rim[np.argsort(-pressure.flat[rim], kind="stable")]
     for count in np.unique(np.linspace(0, len(rim), SUPPORT.levels + 2)[1:-1].round().astype(int)):

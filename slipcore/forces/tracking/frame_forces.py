@@ -100,16 +100,21 @@ class Reader:
 
     def _deviations(self, traction: FloatArray, data: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of elements' forces [3, e] N and of the resultant [3] N: by the data, by what bilinear
-        tractions leave wrong, and by how much the bound on pulling changes what the data say.
+        tractions leave wrong, by how much the bound on pulling changes what the data say, and by what other contacts
+        are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382).
         """
-        bound = traction - (self.key.fit.operator @ data).reshape(traction.shape)
+        linear = self.key.fit.mean(data)
+        bound = traction - linear
         unresolved, of_resultant = self.unresolved.deviations(traction)
-        of_elements = np.zeros_like(self.deviation)
-        of_elements[:, self.unresolved.near] = unresolved
-        return (
-            np.sqrt((misfit * self.deviation) ** 2 + of_elements**2 + (bound @ self.elements.T) ** 2),
-            np.sqrt((misfit * self.total) ** 2 + of_resultant**2 + (self.sensor.load * bound.sum(axis=1)) ** 2),
-        )
+        of_elements = (misfit * self.deviation) ** 2 + (bound @ self.elements.T) ** 2
+        of_elements[:, self.unresolved.near] += unresolved**2
+        total = (misfit * self.total) ** 2 + of_resultant**2 + (self.sensor.load * bound.sum(axis=1)) ** 2
+        for probability, fit in self.key.others:
+            other = fit.mean(data)
+            differs = other @ self.sensor.elements[:, fit.support].T - linear @ self.elements.T
+            of_elements += probability * differs**2
+            total += probability * (self.sensor.load * (other.sum(axis=1) - linear.sum(axis=1))) ** 2
+        return np.sqrt(of_elements), np.sqrt(total)
 
     def _misfit(self, traction: FloatArray, data: FloatArray) -> float:
         """Root mean square of the residuals over their noise, at least 1."""

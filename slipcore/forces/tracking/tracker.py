@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_propagation, generate_binary_structure
+from scipy.special import softmax
 
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
@@ -18,11 +19,15 @@ EDGES_AND_CORNERS = generate_binary_structure(2, 2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Key:
-    """A frame at which the contact was sought, and the fit that holds until markers have moved on."""
+    """A frame at which the contact was sought, and the fit that holds until markers have moved on.
+
+    ``others``: fits on other contacts that data speak for, with their probabilities.
+    """
 
     observation: ObservationModel
     data: FloatArray
     fit: TractionFit
+    others: tuple[tuple[float, TractionFit], ...] = ()
 
     def holds(self, observation: ObservationModel, data: FloatArray) -> bool:
         """Whether a frame sees the same markers and differs by little more than the noise of both."""
@@ -82,15 +87,23 @@ class Tracker:
         nodes, before = self.sensor.nodes, self.key.fit.support
         prior = choose_prior(observation, data, nodes, before, self.criterion, self.prior.smoothness)
         shape = prior.smoothness
-        support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), shape)
+        candidates = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), shape)
+        support = candidates[0].support
         prior = choose_prior(observation, data, nodes, support.ravel(), self.criterion, shape, strength_alone=True)
-        return self._on(observation, data, support, prior)
+        probability = softmax([each.log_probability for each in candidates])
+        fits = [fit(observation, nodes, each.support.ravel(), each.prior) for each in candidates[1:]]
+        return self._on(observation, data, support, prior, tuple(zip(probability[1:], fits, strict=True)))
 
     def _on(
-        self, observation: ObservationModel, data: FloatArray, support: BoolArray, prior: TractionPrior
+        self,
+        observation: ObservationModel,
+        data: FloatArray,
+        support: BoolArray,
+        prior: TractionPrior,
+        others: tuple[tuple[float, TractionFit], ...] = (),
     ) -> "Tracker":
         found = fit(observation, self.sensor.nodes, support.ravel(), prior)
-        return replace(self, prior=prior, key=Key(observation, data, found))
+        return replace(self, prior=prior, key=Key(observation, data, found, others))
 
 
 def lattice_of(sensor: SensorResponse, noise: float, typical: float) -> WholeLattice:

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import hadamard
 
 from slipcore.contact.elasticity.grid import Grid
+from slipcore.forces.defaults import SUPPORT
 from slipcore.forces.inverse.covariance import covariance_root
 from slipcore.forces.inverse.fit import ObservationModel, condensed, log_evidence
 from slipcore.forces.inverse.prior import factors, usual
@@ -110,6 +111,18 @@ def test_a_contact_that_is_cut_on_one_side_alone_is_found(beside: int) -> None:
     observation, data = directly_seen(loaded, 0.02)
     wide = loaded.copy()
     wide[2:6, 5 : 5 + beside] = True
-    found = better_support(observation, data, LATTICE, wide, usual())
+    found = better_support(observation, data, LATTICE, wide, usual())[0].support
     assert found[loaded].all()
     assert (found & ~loaded).sum() <= 4 * (beside - 1) + 1
+
+
+def test_supports_that_data_cannot_tell_apart_are_all_told() -> None:
+    loaded = np.zeros((9, 8), dtype=bool)
+    loaded[2:6, 2:5] = True
+    clear, blurred = (better_support(*directly_seen(loaded, noise), LATTICE, loaded, usual()) for noise in (0.01, 0.4))
+    assert len(clear) == 1
+    assert len(blurred) > 2
+    assert len({each.support.tobytes() for each in blurred}) == len(blurred)
+    probability = np.array([each.log_probability for each in blurred])
+    assert (np.diff(probability) <= 0.0).all()
+    assert probability[-1] >= probability[0] + np.log(SUPPORT.least_probability)
