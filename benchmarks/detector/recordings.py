@@ -2,7 +2,8 @@
 
 They carry no truth. Reported are the gaps met, the marker noise estimated, events, and two shares of slip that is most
 likely false: in frames of mere pressing (by Mindlin and Deresiewicz all sticks), and where the force ratio is below
-half of the median at which elements slip; and how the sensors' own forces agree with those that follow from
+half of the median at which elements slip; where in the contact slip is found while less than half of its friction is
+needed; and how the sensors' own forces agree with those that follow from
 displacement by gels of some thicknesses, for theirs is not known. Writes recordings.json and pictures; says so where
 they are not there.
 """
@@ -10,6 +11,7 @@ they are not there.
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +20,10 @@ from matplotlib.figure import Figure
 from benchmarks.pages import options, picture_folder, save, table, write
 from service.formats import tac3d
 from service.report.pictures import slip_over_time
-from slipcore import GraspLog, SlipHistory, detect_slip, element_forces
+from slipcore import GraspLog, SlipHistory, contact_friction, detect_slip, element_forces
 from slipcore.forces import Agreement, ForceComparison, Gel, compare_forces, reconstruct
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.patch_record import frames_of, joined
 from slipcore.surface.log_normals import normals_of
 
 RECORDINGS = Path(".cache/tac3d/PyTac3D/example_data")
@@ -34,6 +37,8 @@ GAP = 0.1
 
 YOUNG_MODULUS, POISSON_RATIO = 2e5, 0.48
 """Pa, as silicones are; the first only scales forces."""
+BANDS = (0.0, 0.2, 0.4, 1.0)
+"""Of the frame's largest normal force on an element."""
 THICKNESSES = (2e-3, 4e-3, 8e-3, math.inf)
 """m."""
 
@@ -67,6 +72,19 @@ class Found:
     pressing: int
     false_in_pressing: float
     false_by_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Slip while the load ratio is below half of the contact's friction: of all elements, and by what share of the
+    frame's largest normal force they bear, how many these are and how many of them are said to slip.
+    """
+
+    recording: str
+    frames: int
+    slipping: float
+    elements: tuple[float, ...]
+    slipping_of: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +152,29 @@ def find(name: str, log: GraspLog, history: SlipHistory) -> Found:
     )
 
 
+def held(name: str, log: GraspLog, history: SlipHistory) -> Held | None:
+    """What slips while the contact is loaded to less than half of its friction; None where that is not known."""
+    friction, patches = contact_friction(log.time, history.patches), history.patches
+    if friction is None or friction.is_bound:
+        return None
+    assert log.force is not None
+    frames = frames_of(patches)[joined(patches, "load_ratio") < 0.5 * friction.coefficient]
+    normal = element_forces(log.force[frames], normals_of(log)[frames]).normal
+    share, contact, slip = (
+        normal / normal.max(axis=(1, 2), keepdims=True),
+        history.contact[frames],
+        history.slip[frames],
+    )
+    bands = [contact & (share > low) & (share <= high) for low, high in pairwise(BANDS)]
+    return Held(
+        recording=name,
+        frames=len(frames),
+        slipping=float(slip.sum() / contact.sum()),
+        elements=tuple(float(band.sum() / contact.sum()) for band in bands),
+        slipping_of=tuple(float(slip[band].mean()) for band in bands),
+    )
+
+
 def compare(name: str, log: GraspLog, thickness: float) -> ThicknessComparison:
     """A sensor's own forces beside those by a gel of some thickness."""
     assert log.force is not None
@@ -165,7 +206,8 @@ def gel_name(thickness: float) -> str:
 def draw(name: str, log: GraspLog, histories: dict[str, SlipHistory]) -> Figure:
     """Maps and stick ratio of the filter, that of the strain rate beside it, and gaps shaded."""
     figure = slip_over_time(log, histories["filter"], f"{name}: filter (dashed: strain_rate; grey: gaps)")
-    axes, since = figure.axes[-1], log.time - log.time[0]
+    axes = next(each for each in figure.axes if each.get_xlabel())  # the maps above have none
+    since = log.time - log.time[0]
     axes.plot(since, histories["strain_rate"].stick_ratio, color="0.35", ls="--", lw=1.0)
     for before in np.flatnonzero(np.diff(since) > GAP):
         axes.axvspan(since[before], since[before + 1], color="0.85", lw=0, zorder=0)
@@ -177,8 +219,10 @@ def share(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:.1%}"
 
 
-def tables(met: list[Met], found: list[Found], compared: list[ThicknessComparison]) -> dict[str, str]:
-    """What was met, what was found and how forces agree, in Markdown."""
+def tables(
+    met: list[Met], found: list[Found], still: list[Held], compared: list[ThicknessComparison]
+) -> dict[str, str]:
+    """What was met, what was found, what slips where little loads the contact, and how forces agree, in Markdown."""
     columns = ("recording", "frames", "seconds", "dropped", "largest gap, s", "gated frames", "largest normal force, N")
     rows = [list(asdict(entry).values()) for entry in met]
     heads = ("recording", "method", "noise, µm", "stick ratio, mean", "smallest", "onsets", "ends",
@@ -194,7 +238,18 @@ def tables(met: list[Met], found: list[Found], compared: list[ThicknessCompariso
         (c.recording, gel_name(c.thickness), *(cell(getattr(c.agreement, part)) for part in parts)) for c in compared
     ]
     wholes = ("recording", "gel", "normal, elements", "tangential, elements", "normal, contact", "tangential, contact")
-    return {"met": table(columns, rows), "found": table(heads, cells), "forces": table(wholes, agreements)}
+    bands = [f"bear {low:.0%} to {high:.0%}" for low, high in pairwise(BANDS)]
+    of_held = [
+        (
+            h.recording,
+            h.frames,
+            share(h.slipping),
+            *(f"{share(s)} of {share(e)}" for s, e in zip(h.slipping_of, h.elements, strict=True)),
+        )
+        for h in still
+    ]
+    made = {"held": table(("recording", "frames", "slipping", *bands), of_held)}
+    return made | {"met": table(columns, rows), "found": table(heads, cells), "forces": table(wholes, agreements)}
 
 
 def cell(agreement: Agreement) -> str:
@@ -211,16 +266,18 @@ def main() -> None:
     if not logs:
         raise SystemExit(f"no recordings in {arguments.recordings}: `make recordings` fetches them where it can")
     pictures = picture_folder(arguments)
-    met, found = [meet(name, log) for name, log in logs.items()], []
+    met, found, still = [meet(name, log) for name, log in logs.items()], [], []
     for name, log in logs.items():
         histories = {method: detect_slip(log, method) for method in METHODS}
         found += [find(name, log, history) for history in histories.values()]
+        still += [each] if (each := held(name, log, histories["filter"])) else []
         save(draw(name, log, histories), pictures / f"recording-{name.rpartition('/')[2]}.png")
     compared = [compare(name, log, thickness) for name, log in logs.items() for thickness in THICKNESSES]
     save(draw_totals(compared), pictures / "recording-forces.png")
-    made = tables(met, found, compared)
+    made = tables(met, found, still, compared)
     print("\n\n".join(made.values()))
     numbers = {"met": [asdict(entry) for entry in met], "found": [asdict(entry) for entry in found]}
+    numbers["held"] = [asdict(entry) for entry in still]
     numbers["forces"] = [{"recording": c.recording, "thickness": c.thickness, **asdict(c.agreement)} for c in compared]
     write(numbers, made, arguments, "recordings.json")
 
