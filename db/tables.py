@@ -145,6 +145,7 @@ class SensorCalibrationRow(Base):
 class GraspLogRow(Base):
     """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log.
 
+    ``number``: counts up in the order in which logs come in, which no clock moves.
     ``calibration``: the version of its sensor's that was the newest when it was sent, and corrects it.
     ``file_state`` is NULL while the blob is there, since ``file_since``; ``uploaded_by`` is NULL where no key was sent.
     """
@@ -168,6 +169,8 @@ class GraspLogRow(Base):
         Index(None, "created_at", "id"),
         Index(None, "material_id", "created_at", "id"),
         Index(None, "sensor_id", "created_at", "id"),
+        Index(None, "number"),
+        Index(None, "material_id", "number", "id"),
         # counted for each material in a list, without a look at its other logs
         Index(
             "ix_grasp_logs_withdrawn",
@@ -181,6 +184,7 @@ class GraspLogRow(Base):
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    number: Mapped[int] = mapped_column(server_default="0")
     sha256: Mapped[str] = mapped_column(String(64))
     bytes: Mapped[int] = mapped_column(BigInteger)
     format: Mapped[str] = mapped_column(String(50))

@@ -49,9 +49,9 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     """The samples of a material, one entry a grasp, oldest first.
 
     Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
-    still: its newest samples count. Of logs of one grasp the one counts that was sent first.
+    still: the samples of the one that was sent last count. Of logs of one grasp the one counts that was sent first.
     """
-    found = session.execute(_samples(material_id).order_by(SampleSummaryRow.created_at, GraspLogRow.id)).all()
+    found = session.execute(_samples(material_id).order_by(GraspLogRow.number, GraspLogRow.id)).all()
     copies = _copies(found)
     copied = {each for others in copies.values() for each in others}
     counted = {row.sha256: row for row in found if row.sha256 not in copied}
@@ -70,7 +70,7 @@ def others_of_grasp(session: Session, log_id: str, fingerprint: str) -> list[str
         return []
     query = select(GraspLogRow.id).join(SampleSummaryRow).join(DetectionRow)
     same = (DetectionRow.fingerprint == fingerprint, GraspLogRow.sha256 != sha256)
-    ordered = query.where(*_that_count(material_id), *same).order_by(GraspLogRow.created_at, GraspLogRow.id)
+    ordered = query.where(*_that_count(material_id), *same).order_by(GraspLogRow.number, GraspLogRow.id)
     return list(session.scalars(ordered))
 
 
@@ -85,7 +85,7 @@ def signatures(session: Session, log_id: str, most: int, since: datetime = EVER)
     query = select(DetectionRow.fingerprint, DetectionRow.signature).join(GraspLogRow)
     of_others = (GraspLogRow.material_id == material_id, GraspLogRow.sha256 != sha256)
     with_one = query.where(*of_others, DetectionRow.signature.is_not(None), DetectionRow.created_at >= since)
-    ordered = with_one.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)
+    ordered = with_one.order_by(GraspLogRow.number.desc(), GraspLogRow.id.desc()).limit(most)
     with session.execute(ordered.execution_options(yield_per=10)) as rows:  # which may be left before their end
         for row in rows:
             yield Signature(row.fingerprint or "", row.signature or b"")
@@ -94,7 +94,7 @@ def signatures(session: Session, log_id: str, most: int, since: datetime = EVER)
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
     """The same of its newest logs, newest first; of a log that went through several detectors, as it was sent last."""
     newest = _samples(material_id).add_columns(GraspLogRow.grid_rows, GraspLogRow.grid_columns)
-    newest = newest.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)  # as an index has them
+    newest = newest.order_by(GraspLogRow.number.desc(), GraspLogRow.id.desc()).limit(most)  # as an index has them
     rows = session.execute(newest).all()
     copied = {each for others in _copies(rows).values() for each in others}
     found: dict[str, SampledLog] = {}
@@ -108,7 +108,7 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
 def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     """Contents of the same grasp as another that was sent earlier, by the content of the first."""
     contents: dict[str, dict[str, None]] = {}  # by fingerprint, in the order in which they were sent
-    for row in sorted(rows, key=lambda row: (row.created_at, row.id)):
+    for row in sorted(rows, key=lambda row: (row.number, row.id)):
         if row.fingerprint is not None:
             contents.setdefault(row.fingerprint, {})[row.sha256] = None
     return {first: others for first, *others in contents.values() if others}
@@ -125,6 +125,7 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
             DetectionRow.fingerprint,
             SensorRow.name.label("sensor"),
             GraspLogRow.created_at,
+            GraspLogRow.number,
         )
         .join(SampleSummaryRow)
         .join(SensorRow, SensorRow.id == GraspLogRow.sensor_id)

@@ -31,6 +31,7 @@ def add(session: Session, log: NewGraspLog) -> str:
     sensor_id = sensors.find_or_add(session, log.sensor)
     row = GraspLogRow(
         id=uuid.uuid4().hex,
+        number=select(func.coalesce(func.max(GraspLogRow.number), 0) + 1).scalar_subquery(),
         sha256=log.sha256,
         bytes=log.bytes,
         format=log.format,
@@ -122,7 +123,7 @@ def withdraw_before(
         first = session.scalar(query.where(GraspLogRow.id == first_id))
         if first is None:
             raise NotFound("grasp log", first_id)
-        query = query.where(tuple_(GraspLogRow.created_at, GraspLogRow.id) < (first.created_at, first.id))
+        query = query.where(tuple_(GraspLogRow.number, GraspLogRow.id) < (first.number, first.id))
     rows = session.scalars(query.where(GraspLogRow.withdrawn_at.is_(None)).with_for_update()).all()
     for row in rows:
         row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = now(), because, by

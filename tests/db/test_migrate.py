@@ -247,6 +247,19 @@ def test_models_of_logs_that_were_not_checked_say_so(
     assert told == {"new": new_model(), "old": noted}
 
 
+def test_logs_of_before_are_numbered_by_time(database: Database, new_log: Callable[..., NewGraspLog]) -> None:
+    with database.write() as session:
+        ids = [grasp_logs.add(session, new_log()) for _ in range(3)]
+        for log_id, hours in zip(ids, (2, 3, 1), strict=True):
+            moved = update(GraspLogRow).where(GraspLogRow.id == log_id)
+            session.execute(moved.values(created_at=now() + timedelta(hours=hours)))
+    migrate.downgrade(database, "0027")
+    migrate.upgrade(database)
+    with database.write() as session:
+        ids.append(grasp_logs.add(session, new_log()))
+        assert [session.get_one(GraspLogRow, log_id).number for log_id in ids] == [2, 3, 1, 4]
+
+
 def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
     database: Database,
     new_log: Callable[..., NewGraspLog],

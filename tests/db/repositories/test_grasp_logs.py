@@ -3,14 +3,14 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import event, func, select
+from sqlalchemy import event, func, select, update
 
 from db.database import Database
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window
 from db.records import Detection, LogFilter, NewGraspLog, SampleSummary, Signature
 from db.repositories import blobs, detections, grasp_logs, jobs, materials
-from db.tables import SampleSummaryRow, SensorRow
+from db.tables import GraspLogRow, SampleSummaryRow, SensorRow
 
 NEWEST_FIRST = Window("created_at", descending=True)
 
@@ -171,6 +171,24 @@ def test_signatures_of_the_other_logs_of_a_material_come_newest_first(
         assert list(detections.signatures(session, unassigned, 9)) == []
 
 
+def test_no_clock_that_is_set_moves_the_order_of_logs(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    """An epoch left in what had come while the clock was ahead, and the alarm took it for the newest."""
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+        ahead, early, late = logs = [grasp_logs.add(session, new_log(paper)) for _ in range(3)]
+        for log_id in reversed(logs):  # as they were worked on does not count either
+            detections.add(session, log_id, detection, samples)
+        of_first = update(GraspLogRow).where(GraspLogRow.id == ahead)
+        session.execute(of_first.values(created_at=datetime.now(UTC) + timedelta(hours=1)))
+    with database.write() as session:
+        assert [part.grasp_log_id for part in detections.samples_of_material(session, paper)] == logs
+        newest = detections.newest_sampled_logs(session, paper, 2)
+        assert [log.samples.grasp_log_id for log in newest] == [late, early]
+        assert set(grasp_logs.withdraw_before(session, paper, late, "new lot")) == {ahead, early}
+
+
 @pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 def test_the_newest_logs_with_samples_are_found_without_sorting_all(
     database: Database, new_log: Callable[..., NewGraspLog]
@@ -192,7 +210,7 @@ def test_the_newest_logs_with_samples_are_found_without_sorting_all(
         plan = session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", values).all()
     assert [log.samples.grasp_log_id for log in found] == logs[:0:-1]
     assert "TEMP B-TREE" not in str(plan)
-    assert "ix_grasp_logs_material_id_created_at_id" in str(plan)
+    assert "ix_grasp_logs_material_id_number_id" in str(plan)
 
 
 def test_the_blobs_that_rows_refer_to_are_known(
