@@ -90,6 +90,8 @@ class SensorFriction:
     def to_json(self) -> dict[str, Any]:
         """What ``from_json`` reads."""
         told = {each.name: getattr(self, each.name) for each in fields(self)}
+        if self.element_area is None:
+            del told["element_area"]
         degrees = ("degrees_of_freedom", "scatter_degrees_of_freedom")
         lists = {"coefficients": list(self.coefficients), "covariance": [list(row) for row in self.covariance]}
         return told | lists | {name: degrees_to_json(told[name]) for name in degrees}
