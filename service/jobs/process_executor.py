@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import time
 from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 
@@ -69,15 +68,14 @@ class ProcessExecutor:
         """End the worker process once it has taken the CPU time that a job may, or hangs; tells whether it took it."""
         worker_id = spawned.process_id(self._pool)
         begin = last = limits.cpu_seconds(worker_id) if worker_id is not None else None
-        moved = time.monotonic()
+        still = 0.0  # of looks, which a server that is stopped with its worker does not take
         while True:
             await asyncio.sleep(WATCH_SECONDS)
             now = limits.cpu_seconds(worker_id) if worker_id is not None else None
             if begin is None or now is None:
                 continue
-            if now != last:
-                last, moved = now, time.monotonic()
-            is_still = time.monotonic() - moved > STILL_SECONDS
+            still = still + WATCH_SECONDS if now == last else 0.0
+            last, is_still = now, still > STILL_SECONDS
             if is_still:
                 logger.warning("worker process %s has hung for %g s, and is ended", worker_id, STILL_SECONDS)
             if is_still or now - begin > self._cpu_seconds:
