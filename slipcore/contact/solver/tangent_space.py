@@ -67,6 +67,15 @@ class TangentSpace:
         _balance(_flat(self.projector), _flat(self.arm), self.inverse_gram, _flat(move))
         return move
 
+    def outward(self, traction: FloatArray) -> FloatArray:
+        """Tractions [2, ny, nx] with those of sliding cells 1 + curvature·stiffness times as long: at a solution, the
+        gradient step from it.
+
+        Projected, sliding cells stay at their limits. From tractions at the limits, a projection that makes up on all
+        cells for what one of them is cut by would take sliding cells inside, against their slip: the step would climb.
+        """
+        return traction / self.scale**2
+
     def conjugate_gradients(
         self, operator: ElasticOperator, slip: FloatArray, made: FloatArray, reduction: float, max_iterations: int
     ) -> FloatArray:

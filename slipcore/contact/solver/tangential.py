@@ -172,7 +172,7 @@ class _TangentialStep:
         if np.abs(move).max() > TANGENTIAL.move_rounding * self.largest:
             image += self.operator.tangential(move)
         move += space.conjugate_gradients(self.operator, image, move, TANGENTIAL.reduction, TANGENTIAL.iterations)
-        return self.project(traction + move)[0]
+        return self.project(space.outward(traction + move))[0]
 
     def _search(
         self, traction: FloatArray, displacement: FloatArray, slip: FloatArray, trial: FloatArray

@@ -16,10 +16,11 @@ from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import sliding_moment
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import ContactProblem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, MaxwellBranch, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.errors import InvalidInput
 from tests.slipcore.contact.solver.following import (
+    BOUND,
     FORCE,
     FRICTION,
     RADIUS,
@@ -272,6 +273,21 @@ def test_units_do_not_matter() -> None:
         stiff = ContactProblem((body(young=YOUNG * s),), FRICTION, heights=(bowl,))
         scaled = follow(stiff, [at(n * s, t * s, 0.0, m * s) for n, t, m in path])[-1]
         np.testing.assert_allclose(scaled.pose, usual.pose, rtol=1e-7, atol=1e-12)
+
+
+@pytest.mark.parametrize(("cells", "width"), [(64, 13.7e-3), (76, 13.4e-3), (92, 13.4e-3)])
+def test_cells_with_hardly_any_pressure_may_turn_while_many_slide(cells: int, width: float) -> None:
+    """A cylinder on a round gel that creeps: each step some cells touch that hardly bear, and turn far to slide."""
+    angle = 2.514
+
+    def cylinder(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return 0.5 * 5.18 * (np.cos(angle) * y - np.sin(angle) * x) ** 2
+
+    gel = ContactProblem((body(0.49),), 0.534, heights=(bowl, cylinder), creep=(MaxwellBranch(0.374, 0.9585),))
+    press = [StepLoad(force, duration=0.5) for force in (9.75, 19.5)]
+    shear = [StepLoad(19.5, tangential=n * np.array([0.36, -0.175, -4e-4]), duration=0.025) for n in range(1, 9)]
+    solver = QuasiStatic(gel, Grid.square(cells, width), 5e-4, 5e-6, second_order=True)
+    assert max(result.iterations for result in solver.run(press + shear)) <= BOUND
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.5])

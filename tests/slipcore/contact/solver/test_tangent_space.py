@@ -54,6 +54,16 @@ def test_projection_keeps_what_sticks_and_only_turns_what_slides() -> None:
     np.testing.assert_allclose(kept[:, sliding], expected, rtol=0.0, atol=1e-13)
 
 
+def test_outward_tractions_of_a_solution_are_a_gradient_step() -> None:
+    traction, slip, limit, arm, _ = case()
+    sliding = np.zeros(limit.shape, dtype=bool)
+    sliding[::2] = True
+    traction = np.where(sliding, limit * traction / np.hypot(*traction).clip(min=1e-300), 0.9 * traction)
+    slip = np.where(sliding, -0.7 * traction, 0.0)
+    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
+    np.testing.assert_allclose(space.outward(traction), traction - 0.5 * slip, rtol=1e-13)
+
+
 def test_balanced_moves_lie_in_the_space_and_carry_no_load() -> None:
     traction, slip, limit, arm, move = case(1)
     space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
