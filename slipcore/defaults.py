@@ -127,6 +127,8 @@ class ContradictionDefaults(Options):
     """Share of the change of forces that displacement may leave unexplained once a lag is taken out."""
     clearly: Annotated[float, Option(0.0, 1.0, "-", "0.3 at most with a fault on tuning scenes, 0.95 without")] = 0.5
     """Of what is unexplained, the most that taking out a lag or crosstalk may leave."""
+    least_explained: Annotated[float, Option(0.0, 1.0, "-", "0.12 at least with a fault on tuning scenes")] = 0.05
+    """Of the change of forces, the least that taking out a lag or crosstalk must explain."""
     least_crosstalk: Annotated[float, Option(0.0, 1.0, "-", "normals that err by 3°; less costs nothing")] = 0.05
     """From which on it is taken out."""
 

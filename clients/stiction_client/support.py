@@ -33,6 +33,7 @@ OTHERS_CALIBRATIONS = "others_calibrations"
 """Diagnostic, a sentence: how many of a material's logs another key's calibration corrects than sent them."""
 NOTES = (WEAKENING, SAME_GRASPS, UNCHECKED, OTHERS_CALIBRATIONS, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
+ONE_GRASP = "one grasp shows not by how much others differ, and this method does not allow for it: ask method auto"
 SUPERSEDED = "a newer version took its place: fetch the current model"
 
 
@@ -70,7 +71,9 @@ class Model(Protocol):
     @property
     def diagnostics(self) -> Mapping[str, Any]:
         """``doubtful_logs``, where there is one: which findings speak against its logs; ``surface_change``: by how much
-        the newest of them differ from those before; ``unknown_velocity``: that the object's motion was not recorded.
+        the newest of them differ from those before; ``unknown_velocity``: that the object's motion was not recorded;
+        ``cluster_kind``: what of the samples shares errors, "grasp" where there are several; ``scale_between_grasps``:
+        by how much they are thought to differ, of methods that allow for it.
         """
 
 
@@ -80,7 +83,8 @@ class Support:
 
     ``kind``, the first that applies: "implausible" (friction cannot be so, or findings speak against the logs),
     "stale" (the model is not the material's any more), "not identified" (the data do not show friction there, or no
-    coefficient at all), "extrapolated" (beyond the data), "supported".
+    coefficient at all, or are of one grasp by a method that takes the next one to be alike), "extrapolated" (beyond
+    the data), "supported".
     """
 
     kind: Kind
@@ -107,6 +111,8 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
     if not part <= UNCERTAIN or not any(model.identifiable.tolist()):
         return Support("not identified", _ignorance(part))
+    if _knows_no_scatter(model):
+        return Support("not identified", ONE_GRASP)
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
     if outside is not None:
         return Support("extrapolated", f"{outside}: record a grasp there")
@@ -128,7 +134,7 @@ def kinds(
     if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
     told = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
-    unknown = ~told | ((v > 0.0) & _knows_no_velocity(model))
+    unknown = ~told | ((v > 0.0) & _knows_no_velocity(model)) | _knows_no_scatter(model)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
     return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
@@ -224,6 +230,12 @@ def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
 def _knows_no_velocity(model: Model) -> bool:
     """Whether the model's samples say nothing of velocity, for none of their objects' motion was recorded."""
     return "unknown_velocity" in model.diagnostics and not model.domain.tangential_velocity[1] > 0.0
+
+
+def _knows_no_scatter(model: Model) -> bool:
+    """Whether it is of one grasp, by a method that allows for no other friction in the next one."""
+    kind = model.diagnostics.get("cluster_kind")
+    return kind is not None and kind != "grasp" and "scale_between_grasps" not in model.diagnostics
 
 
 def _inverse(bound: float) -> float:

@@ -5,7 +5,6 @@ it is measured, and alike: neither force, place nor scatter shows it. The marker
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from slipcore.checks.subject import Subject
 from slipcore.errors import InvalidInput
 from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.surface.log_normals import normals_of
+from slipcore.surface.log_normals import normals_of_shape
 
 ComplexArray = NDArray[np.complex128]
 
@@ -109,13 +108,12 @@ def leaning_normals(seen: Subject) -> Iterator[Finding]:
         return
     idle = np.flatnonzero(~seen.history.contact.any(axis=(1, 2)))
     frames = idle if len(idle) > 1 else np.arange(len(log))
-    chosen = log.take(np.unique(frames[np.linspace(0, len(frames) - 1, seen.limits.stretch_frames).astype(int)]))
-    assert chosen.normal is not None
+    chosen = np.unique(frames[np.linspace(0, len(frames) - 1, seen.limits.stretch_frames).astype(int)])
     try:
-        own = normals_of(replace(chosen, normal=None))
+        own = normals_of_shape(log.position, log.displacement[chosen])
     except InvalidInput:  # no lattice, of which no shape follows
         return
-    given, surface = (_direction(each) for each in (chosen.normal, own))
+    given, surface = (_direction(each) for each in (log.normal[chosen], own))
     lean = float(np.linalg.norm(np.cross(given, surface), axis=-1).min())
     if lean > seen.limits.normal_lean:
         degrees = np.degrees(np.arcsin(min(lean, 1.0)))

@@ -89,8 +89,15 @@ def lag_of_forces(changes: Changes) -> float:
     most = min(round(CONTRADICTION.longest_lag / step), count // 3)
     left = [unexplained(displacement[: count - lag], force[lag:]) for lag in range(most + 1)]
     best = int(np.argmin(left))
-    clear = left[best] < CONTRADICTION.largest_left and left[best] < CONTRADICTION.clearly * left[0]
-    return step * best if clear else 0.0
+    return step * best if left[best] < CONTRADICTION.largest_left and _is_clear(left[0], left[best]) else 0.0
+
+
+def _is_clear(before: float, left: float) -> bool:
+    """Whether taking out a fault explains changes of force: shares of them that are unexplained ``before`` and after.
+
+    Where hardly anything is, as without noise, the rest is what no gel does exactly, and any fault would explain it.
+    """
+    return left < CONTRADICTION.clearly * before and before - left > CONTRADICTION.least_explained
 
 
 def brought_forward(log: GraspLog, lag: float) -> GraspLog:
@@ -106,6 +113,8 @@ def crosstalk_of(changes: Changes) -> FloatArray:
     Least squares of ΔΣF_t = k ΔΣu_t + c ΔF_N, against the same without c.
     """
     along, sideways = changes.displacement[:, ALONG].T.ravel(), changes.force[:, ALONG].T.ravel()
+    if not along.any():  # a sensor of depth alone, which says nothing of them
+        return np.zeros(2)
     pressing, nothing = -changes.force[:, 2], np.zeros(len(changes.force))
     columns = np.column_stack([along, np.r_[pressing, nothing], np.r_[nothing, pressing]])
     found = np.linalg.lstsq(columns, sideways)[0]
@@ -113,5 +122,6 @@ def crosstalk_of(changes: Changes) -> FloatArray:
         float(((sideways - used @ np.linalg.lstsq(used, sideways)[0]) ** 2).sum()) for used in (columns, columns[:, :1])
     )
     leak: FloatArray = found[1:]
-    clear = np.hypot(*leak) > CONTRADICTION.least_crosstalk and left < CONTRADICTION.clearly * without
+    total = float(sideways @ sideways) or 1.0
+    clear = np.hypot(*leak) > CONTRADICTION.least_crosstalk and _is_clear(without / total, left / total)
     return leak if clear else np.zeros(2)

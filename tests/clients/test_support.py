@@ -20,7 +20,7 @@ from stiction_client import (
     required_normal_force,
     sdf_surface,
 )
-from stiction_client.support import BEND, Support, disagreement, kinds, support
+from stiction_client.support import BEND, ONE_GRASP, Support, disagreement, kinds, support
 
 Make = Callable[..., FrictionModel]
 
@@ -61,6 +61,17 @@ def test_velocities_that_nobody_knows_are_no_support(make_model: Make) -> None:
     assert still.support_at(0.0, 0.1).kind == "supported"
     assert kinds(still, [0.0, 1e-3], 0.1).tolist() == ["supported", "not identified"]
     assert model.support_at(1e-3, 0.1).kind == "supported"  # other grasps tell of velocity
+
+
+@pytest.mark.parametrize("kind", ["element", "time block", "none"])
+def test_one_grasp_has_support_only_where_the_next_one_may_differ(make_model: Make, kind: str) -> None:
+    model = replace(make_model((0.4, 0.0, 0.0), EXACT), diagnostics={"cluster_kind": kind})
+    found = model.support_at(0.0, 0.1)
+    assert (found.kind, found.advice) == ("not identified", ONE_GRASP)
+    assert kinds(model, [0.0, 1e-3], 0.1).tolist() == ["not identified"] * 2
+    several = replace(model, diagnostics={"cluster_kind": "grasp"})
+    allowing = replace(model, diagnostics={"cluster_kind": kind, "scale_between_grasps": 0.1})
+    assert several.support_at(0.0, 0.1).kind == allowing.support_at(0.0, 0.1).kind == "supported"
 
 
 def test_a_model_tells_what_it_rests_on_in_the_middle_of_its_data(make_model: Make) -> None:

@@ -102,7 +102,7 @@ HEED_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_in
 
 def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(tmp_path: Path) -> None:
     run = f"{HEED_INTERRUPTS}; import runpy; runpy.run_module('service.cli', run_name='__main__')"
-    given = ["simulate", "lifting_10N", "--accuracy", "0.01", "--output", str(tmp_path / "log.npz")]
+    given = ["simulate", "lifting_10N", "--accuracy", "0.001", "--output", str(tmp_path / "log.npz")]
     with subprocess.Popen([sys.executable, "-c", run, *given], stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         assert process.stderr.read(1) == b"\r"  # it is at it

@@ -17,7 +17,7 @@ from db.records import Gel, NewCalibration
 from db.repositories import calibrations, detections, grasp_logs, jobs, materials, runners, sensors
 from db.tables import DetectionRow, JobRow
 from service.domain import keys
-from service.domain.calibrate import OFFSET, corrected, correction_findings
+from service.domain.calibrate import OFFSET, Correction, corrected, correction_findings
 from service.domain.reconstruct import RECONSTRUCTED
 from service.domain.sensors import NAMELESS
 from service.jobs import pipeline
@@ -496,7 +496,7 @@ def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database,
         left = corrected(session, part, "cut", 1, "filter")
         assert (left.log, left.version) == (part, 1)
         assert left.changed == ("nothing: calibrated on 12 × 12 elements, and the log has 10 × 12",)
-        assert corrected(session, part, "cut", None, "filter") == (part, None, None, {})
+        assert corrected(session, part, "cut", None, "filter") == Correction(part, None, None, {})
 
 
 def test_a_log_that_is_looked_at_again_is_corrected_as_it_was(
