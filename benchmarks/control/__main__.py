@@ -1,4 +1,4 @@
-"""Grip control in closed loop: `python -m benchmarks.control [--seeds 100 50 10] [--page docs/control.md]`.
+"""Grip control in closed loop: `python -m benchmarks.control [--seeds 100 50 10] [--page docs/accuracy-control.md]`.
 
 Each strategy (benchmarks/control/strategies.py) does each task (benchmarks/control/tasks.py) in the reduced world, with
 the real detector on noisy frames, from each seed (friction of the grasp, its field, noise). Writes control.json and

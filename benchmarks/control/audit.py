@@ -1,4 +1,5 @@
-"""Closed loops on boundary elements: `python -m benchmarks.control.audit [--seeds 1] [--page docs/control.md]`.
+"""Closed loops on boundary elements: `python -m benchmarks.control.audit [--seeds 1] [--page PAGE]`, whose page is
+docs/accuracy-control.md.
 
 Episodes of benchmarks/control with one finger, repeated on boundary elements (benchmarks/control/elements.py) with
 the same friction, noise and strategy: whether the object is held likewise, and under which force. How much of the

@@ -1,4 +1,5 @@
-"""Forces found from displacement: `python -m benchmarks.forces [--page docs/forces.md] [--only GROUP …] [--quick]`.
+"""Forces found from displacement: `python -m benchmarks.forces [--only GROUP …] [--quick]`, with `--page
+docs/accuracy-forces.md` for its page.
 
 Presses whose forces are known (benchmarks/forces/scenes.py) are seen by simulated sensors, with depth and in the plane
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of 5
