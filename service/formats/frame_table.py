@@ -6,6 +6,7 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,10 @@ class _Table:
         fields += [*mapping.notes.values(), *([] if mapping.element is None else [mapping.element])]
         chosen = sorted({column for field in fields for column in self._columns(field)})
         self._place = {column: k for k, column in enumerate(chosen)}
-        self._values = self._read(rows(lines, delimiter, len(self._names), before, MAX_ROWS), chosen)
+        masks = [origin for name, origin in mapping.origins.items() if name in MASKS]
+        of_masks = [field for origin in masks for field in origin.fields]
+        stated = {column for field in (*of_masks, *mapping.notes.values()) for column in self._columns(field)}
+        self._values = self._read(rows(lines, delimiter, len(self._names), before, MAX_ROWS), chosen, stated)
         self._order = None if mapping.element is None else self._of_elements(mapping.element)
 
     def column(self, name: str, _topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
@@ -166,13 +170,18 @@ class _Table:
         if any(each != numbers[0] or len(set(each)) < len(each) for each in numbers):
             found = "; ".join(f"{', '.join(map(str, each[:9]))}" for each in numbers)
             raise InvalidInput(name, f"of the elements {found}"[:200], "the same in each component, each once")
+        for lower, upper in pairwise(numbers[0] if numbers else ()):
+            if upper > lower + 1:  # all after it would be taken for their neighbours
+                raise InvalidInput(name, f"of elements {lower} and {upper}, not {lower + 1}", "numbers without a gap")
 
-    def _read(self, lines: Iterator[tuple[int, list[str]]], chosen: list[int]) -> FloatArray:
+    def _read(self, lines: Iterator[tuple[int, list[str]]], chosen: list[int], stated: set[int]) -> FloatArray:
+        """The ``chosen`` columns; ``True`` and ``False`` are numbers in those ``stated`` alone, and no force."""
         values = array("d")
         for line, cells in lines:
             values.extend(
                 parse_number(
-                    TRUTH.get(text := cells[column].strip(), text), line, self._names[column], "a finite number"
+                    TRUTH.get(text := cells[column].strip(), text) if column in stated else cells[column].strip(),
+                    *(line, self._names[column], "a finite number"),
                 )
                 for column in chosen
             )

@@ -100,6 +100,15 @@ def test_a_second_sensors_columns_have_its_number(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.force[..., 0], field(first, "F")[..., 0], rtol=1e-12, err_msg="the first's")
 
 
+def test_a_column_that_is_missing_is_no_element_less(tmp_path: Path) -> None:
+    """All elements after it would be taken for their neighbours."""
+    path = tmp_path / "log.csv"
+    path.write_text("t,P0_X,P1_X,P3_X\n0,0,0,0\n1,0,0,0\n")
+    mapping = {"time": "t", "displacement": ["P*_X"] * 3, "grid": [1, 3], "pitch": 1e-3}
+    with pytest.raises(InvalidInput, match="is of elements 1 and 3, not 2; allowed: numbers without a gap"):
+        formats.read(path, "text/csv", mapping=json.dumps(mapping))
+
+
 def test_elements_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     order = (10, 2, 1, 0, 3, 4, 5, 6, 7, 8, 9, 11)
     lines = [["t", *(f"u{k}" for k in order)], *([t, *map(str, order)] for t in "01")]
@@ -159,6 +168,7 @@ def test_only_a_mapping_makes_text_a_table_of_frames(tmp_path: Path) -> None:
         ("t,a\n0,1\n,2\n", "time"),
         ("t,a\n1,1\n0,2\n", "time"),
         ("t,a\n0,1\n1,\n", "displacement"),
+        ("t,a\n0,1\n1,True\n", "line 3, a is 'True'; allowed: a finite number"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, content: str, message: str) -> None:
