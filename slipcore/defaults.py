@@ -71,9 +71,9 @@ class NoiseDefaults(Options):
     """No finer one is distinguished from none."""
     field_bend: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes: 0.003 around the rim of a cup")] = 0.004
     """How much of its size a field of displacement may bend by without noise."""
-    stale_time: Annotated[
-        float, Option(0.0, 1e3, "s", "forces at 10 Hz beside markers at 30 fps repeat for 0.07 s")
-    ] = 0.1
+    stale_time: Annotated[float, Option(0.0, 1e3, "s", "forces at 3 Hz beside markers at 30 fps repeat for 0.3 s")] = (
+        0.5
+    )
     """From which on noisy forces are not believed that stay the same to the last bit while markers move."""
     stale_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "one in 10⁶ of white noise")] = 5.0
     """By which a sum over all markers must have changed meanwhile for these to have moved."""
@@ -123,6 +123,16 @@ class ContradictionDefaults(Options):
     """For each frame; a log with more is mostly gaps."""
     longest_lag: Annotated[float, Option(0.0, 60.0, "s", "two clocks are further apart, or not at all")] = 1.0
     """By which forces may be late."""
+    largest_noise: Annotated[float, Option(0.0, 1.0, "-", "stiffness comes out smaller by as much")] = 0.1
+    """Share of the change of displacement that is noise, in steps by which crosstalk is sought."""
+    largest_likeness: Annotated[float, Option(0.0, 1.0, "-", "above 0.9 in a press at a slant")] = 0.5
+    """Squared correlation of displacement along the surface with normal force, above which it is not sought."""
+    as_good: Annotated[float, Option(0.0, 1.0, "-", "0.17 on a scene with late forces; under a periodic load 0")] = 0.1
+    """Of forces' change, by which what another lag leaves unexplained must be more."""
+    coarsening: Annotated[float, Option(1.01, 10.0, "-", "a few tries from a frame to a second")] = 1.5
+    """By which steps become longer until it is no more."""
+    largest_rim: Annotated[float, Option(0.0, 1.0, "-", "a contact cut to half bears 0.2 there")] = 0.1
+    """Share of normal forces on the outer elements from which on the contact leaves the lattice."""
     largest_left: Annotated[float, Option(0.0, 1.0, "-", "0.21 at most on tuning scenes with late forces")] = 0.3
     """Share of the change of forces that displacement may leave unexplained once a lag is taken out."""
     clearly: Annotated[float, Option(0.0, 1.0, "-", "0.3 at most with a fault on tuning scenes, 0.95 without")] = 0.5
@@ -713,6 +723,14 @@ class CheckOptions(Options):
         0.15
     )
     """Share by which the sum of normal forces may differ from the gripper's force, in the median."""
+    gripper_full: Annotated[float, Option(0.0, 1.0, "-", "the ramp of a grip is left out")] = 0.8
+    """Share of the gripper's largest force from which on both are compared."""
+    gripper_delay: Annotated[float, Option(0.0, 10.0, "s", "a gripper's report at 10 Hz")] = 0.1
+    """By which the gripper's report may be late."""
+    gripper_change: Annotated[float, Option(0.0, 1.0, "-", "a third of the share by which both may differ")] = 0.05
+    """Share of its largest force by which it may change within that in frames that are compared."""
+    gripper_cropped: Annotated[float, Option(0.0, 1.0, "-", "most of a contact is on it; kgf give 0.1")] = 0.25
+    """Least share of the gripper's force that elements may bear where the contact leaves the lattice."""
     gripper_trend: Annotated[float, Option(0.0, 10.0, "-", "half of what friction differs by between places")] = 0.08
     """Share by which their ratio may change from the first to the last fifth of the frames held."""
     contact_likeness: Annotated[float, Option(0.0, 1.0, "-", "an offset is alike everywhere, about 0")] = 0.5

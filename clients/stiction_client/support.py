@@ -234,8 +234,8 @@ def _knows_no_velocity(model: Model) -> bool:
 
 def _knows_no_scatter(model: Model) -> bool:
     """Whether it is of one grasp, by a method that allows for no other friction in the next one."""
-    kind = model.diagnostics.get("cluster_kind")
-    return kind is not None and kind != "grasp" and "scale_between_grasps" not in model.diagnostics
+    of_one = model.diagnostics.get("cluster_kind") in ("element", "time block", "none")
+    return of_one and "scale_between_grasps" not in model.diagnostics
 
 
 def _inverse(bound: float) -> float:

@@ -134,7 +134,7 @@ def _from_moments(moments: list[SufficientStatistics]) -> FitData:
         domain=Domain(_range(v[np.isfinite(v)]), whole.domain.normal_force),
         element_area=whole.element_area,
         clusters=len(blocks),
-        cluster_kind="grasp" if len(blocks) > 1 else "none",
+        cluster_kind="grasp" if len(blocks) > 1 else "merged" if len(blocks[0].grasps) > 1 else "none",
         observations=None,
         blocks=blocks,
         unknown=_unit(whole) * np.array([whole.unknown_weight, 0.0, whole.unknown_force]),

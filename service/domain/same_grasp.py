@@ -28,7 +28,10 @@ MOST_LOGS, MOST_COMPARED = 1000, 1_000_000
 """Logs of a material, the newest, and frames of all of them, with which a new one is compared: a second at most."""
 
 ASKED = 64
-"""Frames of a log, among those with more than half of its largest load, that are looked for in another."""
+"""Frames of a log, among those with more than half of its usual largest load, that are looked for in another."""
+
+OF_FORCE, OF_DISPLACEMENT = b"f", b"d"
+"""Of which readings a signature is, in its first byte."""
 
 SHARED = 0.75
 """-, of these frames that another log has, from which on both are of one grasp."""
@@ -39,7 +42,7 @@ sums are as near in 6 of 10⁷ pairs.
 """
 
 DIGITS = 5e-4
-"""-, of the largest sum, within which it is the same whatever the noise: readings were rounded."""
+"""-, of the smaller log's usual largest sum, within which it is the same whatever the noise: readings were rounded."""
 
 TOLD = 5
 """Copies that a note names; of more it says how many there are."""
@@ -71,7 +74,7 @@ def signature(log: "GraspLog") -> bytes:
     kept = min(len(measured), MOST_FRAMES)
     parts = (measured[begin : min(begin + FRAMES, kept)] for begin in range(0, kept, FRAMES))
     sums = np.concatenate([part.reshape(len(part), -1) @ signs for part in parts])
-    return bytes(sums.astype("<f4").tobytes())
+    return (OF_DISPLACEMENT if log.force is None else OF_FORCE) + sums.astype("<f4").tobytes()
 
 
 def find_alike(own: bytes, others: "Iterable[Signature]") -> "Signature | None":
@@ -88,9 +91,11 @@ def find_alike(own: bytes, others: "Iterable[Signature]") -> "Signature | None":
 
 def is_alike(one: bytes, other: bytes) -> bool:
     """Whether these signatures are of one grasp: most frames under load of one of the logs are in the other, too."""
-    sums = [np.frombuffer(each, "<f4").reshape(-1, SUMS).astype(float) for each in (one, other)]
+    if one[:1] != other[:1]:
+        return False
+    sums = [np.frombuffer(each, "<f4", offset=1).reshape(-1, SUMS).astype(float) for each in (one, other)]
     within = NOISE_SHARE * np.minimum(*map(_noise, sums))
-    within = np.maximum(within, DIGITS * max(float(np.abs(each).max(initial=0.0)) for each in sums))
+    within = np.maximum(within, DIGITS * min(_usual(np.abs(each).max(axis=1)) for each in sums))
     if not within.all():
         return False
     frames, others = (each / within for each in sums)
@@ -101,6 +106,11 @@ def _signs(readings: int) -> "FloatArray":
     """Of each reading in each sum, [readings, SUMS], 1 or -1: the same in every version."""
     drawn = hashlib.shake_256(b"stiction").digest(readings * SUMS // 8)
     return np.asarray(2.0 * np.unpackbits(np.frombuffer(drawn, np.uint8)).reshape(readings, SUMS) - 1.0, float)
+
+
+def _usual(values: "FloatArray") -> float:
+    """The largest but for a twentieth: one reading that is odd makes nothing else small."""
+    return float(np.quantile(values, 0.95)) if len(values) else 0.0
 
 
 def _noise(sums: "FloatArray") -> "FloatArray":
@@ -115,7 +125,7 @@ def _shared(frames: "FloatArray", others: "FloatArray") -> float:
     from scipy.spatial import cKDTree
 
     load = np.linalg.norm(frames, axis=1)
-    loaded = np.flatnonzero(load > 0.5 * load.max(initial=0.0))
+    loaded = np.flatnonzero(load > 0.5 * _usual(load))
     if not loaded.size:
         return 0.0
     asked = frames[loaded[np.unique(np.linspace(0, len(loaded) - 1, ASKED).astype(int))]]

@@ -171,7 +171,7 @@ class _Table:
             found = "; ".join(f"{', '.join(map(str, each[:9]))}" for each in numbers)
             raise InvalidInput(name, f"of the elements {found}"[:200], "the same in each component, each once")
         for lower, upper in pairwise(numbers[0] if numbers else ()):
-            if upper > lower + 1:  # all after it would be taken for their neighbours
+            if upper == lower + 2 and numbers[0][-1] - numbers[0][0] == len(numbers[0]):  # else numbered otherwise
                 raise InvalidInput(name, f"of elements {lower} and {upper}, not {lower + 1}", "numbers without a gap")
 
     def _read(self, lines: Iterator[tuple[int, list[str]]], chosen: list[int], stated: set[int]) -> FloatArray:

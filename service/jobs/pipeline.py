@@ -55,6 +55,9 @@ logger = logging.getLogger(__name__)
 OVERLAP = timedelta(minutes=1)
 """By which the clocks of two workers may differ that store logs of one grasp at once."""
 
+LATE_LOGS = 50
+"""At most, with which a log is compared once more while others wait to write."""
+
 FITS_BESIDE_OTHERS = 3
 """Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
 
@@ -192,9 +195,9 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.database.write() as session:
         materials_of_logs.hold(session, log_id)
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
-        late = find_alike(own, detections.signatures(session, log_id, MOST_LOGS, since=began - OVERLAP))
+        late = find_alike(own, detections.signatures(session, log_id, LATE_LOGS, since=began - OVERLAP))
         detection = replace(detection, fingerprint=late.fingerprint) if late else detection
-        detections.add(session, log_id, detection, summary, own)
+        detections.add(session, log_id, detection, summary, own if history.contact.any() else None)
         jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
     return summary
 

@@ -81,13 +81,16 @@ def gripper_force(seen: Subject) -> Iterator[Finding]:
     force, reported = _measured(seen), seen.log.gripper_force
     if force is None or reported is None:
         return
-    held = np.flatnonzero(seen.held & (reported > 0.0))
+    most, within = float(reported.max()), seen.limits.gripper_delay * np.abs(np.gradient(reported, seen.log.time))
+    is_steady = (reported > seen.limits.gripper_full * most) & (within < seen.limits.gripper_change * most)
+    held = np.flatnonzero(seen.held & is_steady)
     if len(held) < seen.limits.least_held:
         return
     ratio, fifth = seen.total[held] / reported[held], max(len(held) // 5, 2)
     unsure = 3.0 * (seen.log.gripper_force_deviation or 0.0) / float(np.median(reported[held]))
     told, begin, end = (float(np.median(each)) for each in (ratio, ratio[:fifth], ratio[-fifth:]))
-    if max(told, 1.0 / told) - 1.0 > max(seen.limits.gripper_share, unsure):
+    beside = seen.limits.gripper_cropped <= told < 1.0 and _leaves_the_lattice(seen, held)
+    if max(told, 1.0 / told) - 1.0 > max(seen.limits.gripper_share, unsure) and not beside:
         evidence = f"the normal forces of all elements add up to {told:.2g} of what the gripper reports"
         remedy = "make sure of N on all axes (kgf: 0.1; mN: 1000), and that it is this finger's force"
         yield Finding("gripper's force differs", evidence, remedy)
@@ -99,6 +102,12 @@ def gripper_force(seen: Subject) -> Iterator[Finding]:
         yield Finding(
             "gripper's force differs", evidence, "the sensor creeps: grasp for a shorter time, or calibrate it"
         )
+
+
+def _leaves_the_lattice(seen: Subject, held: NDArray[np.intp]) -> bool:
+    """Whether outer elements mostly touch in these frames: what lies beside them bears some of the force."""
+    touched = seen.history.contact[held].mean(axis=0) > 0.5
+    return int(touched.sum()) > int(touched[1:-1, 1:-1].sum())
 
 
 def leaning_normals(seen: Subject) -> Iterator[Finding]:

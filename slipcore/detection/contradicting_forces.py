@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import label
 
 from slipcore.defaults import CONTRADICTION
 from slipcore.finding import Finding
@@ -37,8 +38,8 @@ def agreeing(log: GraspLog) -> tuple[GraspLog, tuple[Finding, ...]]:
         log = brought_forward(log, lag)
         evidence = f"forces come {lag:.2f} s after the displacement that they go with; slip is found with both at once"
         found.append(Finding("late forces", evidence, "give both the times at which they were measured"))
-    leak = crosstalk_of(changes_of(log))
-    if leak.any():
+    leak = crosstalk_of(slow_changes_of(log))
+    if leak.any() and not _leaves_the_lattice(log):
         assert log.force is not None
         force = log.force.copy()
         force[..., :2] += leak * force[..., 2:]
@@ -48,9 +49,9 @@ def agreeing(log: GraspLog) -> tuple[GraspLog, tuple[Finding, ...]]:
     return log, tuple(found)
 
 
-def changes_of(log: GraspLog) -> Changes:
+def changes_of(log: GraspLog, least_step: float = CONTRADICTION.least_step) -> Changes:
     """How the log's sums change, in means over two steps of even length; empty where most of it is gaps."""
-    step = max(float(np.median(np.diff(log.time))), CONTRADICTION.least_step)
+    step = max(float(np.median(np.diff(log.time))), least_step)
     count = int((log.time[-1] - log.time[0]) / step) - 1
     assert log.force is not None
     if count > CONTRADICTION.most_steps * len(log):
@@ -70,6 +71,27 @@ def _changes(log: GraspLog, field: FloatArray, middle: FloatArray, step: float) 
     return np.diff(np.transpose(means) / (2.0 * step), axis=0)
 
 
+def slow_changes_of(log: GraspLog) -> Changes:
+    """The same in steps so long that noise is small beside the changes of displacement along the surface; empty where
+    there are none. Noise in a column of a regression lets another, that is nearly in proportion to it, take its place.
+    """
+    changes = changes_of(log)
+    while len(changes.force) >= CONTRADICTION.least_frames:
+        along = changes.displacement[:, ALONG]
+        noise = np.square(along[6:] - 2.0 * along[3:-3] + along[:-6]).mean() / 6.0  # apart enough to share no frames
+        if noise <= CONTRADICTION.largest_noise * np.square(along).mean():
+            return changes
+        changes = changes_of(log, CONTRADICTION.coarsening * changes.step)
+    return Changes(changes.step, np.zeros((0, 4)), np.zeros((0, 4)))
+
+
+def _leaves_the_lattice(log: GraspLog) -> bool:
+    """Whether the contact lies partly beside the elements, which then see a part of how the gel bulges alone."""
+    assert log.force is not None
+    borne = log.force[..., 2].sum(axis=0)
+    return bool(abs(borne.sum() - borne[1:-1, 1:-1].sum()) > CONTRADICTION.largest_rim * abs(borne.sum()))
+
+
 def unexplained(displacement: FloatArray, force: FloatArray) -> float:
     """Share of the changes of force [k, 4] N, squared, that no stiffness makes of those of displacement [k, 4] m."""
     left = 0.0
@@ -83,13 +105,22 @@ def unexplained(displacement: FloatArray, force: FloatArray) -> float:
 
 
 def lag_of_forces(changes: Changes) -> float:
-    """By how much forces come later than the displacement that they go with, s; 0 where that is not clear."""
+    """By how much forces come later than the displacement that they go with, s; 0 where that is not clear.
+
+    Under a load that comes again and again they go with any of several lags, and none is taken.
+    """
     step, displacement, force = changes
     count = len(force)
     most = min(round(CONTRADICTION.longest_lag / step), count // 3)
-    left = [unexplained(displacement[: count - lag], force[lag:]) for lag in range(most + 1)]
+    early = [unexplained(displacement[lag:], force[: count - lag]) for lag in range(most, 0, -1)]
+    late = [unexplained(displacement[: count - lag], force[lag:]) for lag in range(most + 1)]
+    left = np.array(early + late)
     best = int(np.argmin(left))
-    return step * best if left[best] < CONTRADICTION.largest_left and _is_clear(left[0], left[best]) else 0.0
+    near, _ = label(left < CONTRADICTION.largest_left)
+    if best <= most or not near[best]:
+        return 0.0
+    is_one = left[near != near[best]].min(initial=1.0) > left[best] + CONTRADICTION.as_good
+    return step * (best - most) if is_one and _is_clear(late[0], float(left[best])) else 0.0
 
 
 def _is_clear(before: float, left: float) -> bool:
@@ -110,18 +141,22 @@ def brought_forward(log: GraspLog, lag: float) -> GraspLog:
 def crosstalk_of(changes: Changes) -> FloatArray:
     """Share of the normal force that appears along x and along y without displacement, [2]; 0 where that is not clear.
 
-    Least squares of ΔΣF_t = k ΔΣu_t + c ΔF_N, against the same without c.
+    Least squares of ΔΣF = k ΔΣu + c ΔF_N along each axis, against the same without c. Of a press at a slant, where both
+    columns are alike, they tell nothing.
     """
-    along, sideways = changes.displacement[:, ALONG].T.ravel(), changes.force[:, ALONG].T.ravel()
-    if not along.any():  # a sensor of depth alone, which says nothing of them
-        return np.zeros(2)
-    pressing, nothing = -changes.force[:, 2], np.zeros(len(changes.force))
-    columns = np.column_stack([along, np.r_[pressing, nothing], np.r_[nothing, pressing]])
-    found = np.linalg.lstsq(columns, sideways)[0]
-    left, without = (
-        float(((sideways - used @ np.linalg.lstsq(used, sideways)[0]) ** 2).sum()) for used in (columns, columns[:, :1])
-    )
-    leak: FloatArray = found[1:]
-    total = float(sideways @ sideways) or 1.0
+    pressing = -changes.force[:, 2]
+    leak, left, without = np.zeros(2), 0.0, 0.0
+    for axis in (0, 1):
+        moved, pushed = changes.displacement[:, axis], changes.force[:, axis]
+        if not moved.any():  # a sensor of depth alone says nothing of them
+            return np.zeros(2)
+        if (moved @ pressing) ** 2 > CONTRADICTION.largest_likeness * (moved @ moved) * (pressing @ pressing):
+            return np.zeros(2)
+        columns = np.column_stack([moved, pressing])
+        found, alone = np.linalg.lstsq(columns, pushed)[0], np.linalg.lstsq(columns[:, :1], pushed)[0]
+        left += float(((pushed - columns @ found) ** 2).sum())
+        without += float(((pushed - columns[:, :1] @ alone) ** 2).sum())
+        leak[axis] = found[1]
+    total = float((changes.force[:, ALONG] ** 2).sum()) or 1.0
     clear = np.hypot(*leak) > CONTRADICTION.least_crosstalk and _is_clear(without / total, left / total)
     return leak if clear else np.zeros(2)

@@ -117,3 +117,19 @@ def test_a_note_names_the_copies_and_what_to_do() -> None:
     (told,) = notes(with_copies(model, [replace(alone, copies=tuple("bcdefgh"))]).diagnostics)
     assert told.startswith("7 logs repeat ")
     assert "f of a, 2 more)" in told
+
+
+@pytest.mark.parametrize("reading", [2e-4, 20.0, 9999.0])
+def test_a_reading_that_is_odd_makes_no_grasp_like_another(ramp: GraspLog, reading: float) -> None:
+    """Of a log that nothing touches but for it, or of a sound one: all later logs of the material were copies of it."""
+    one, other = noisy(ramp, 1), noisy(ramp, 2)
+    assert one.force is not None
+    empty, odd = np.zeros(one.force.shape), one.force.copy()
+    empty[20:60:3, 5, 5, 2] = odd[40, 3, 3, 2] = reading
+    assert not alike(replace(one, force=empty), other)
+    assert not alike(replace(one, force=odd), other)
+    assert alike(replace(one, force=odd), one)
+
+
+def test_forces_are_never_like_displacements(ramp: GraspLog) -> None:
+    assert not is_alike(signature(ramp), signature(replace(ramp, force=None)))

@@ -45,7 +45,7 @@ def test_sound_forces_stay_as_they_are(scene: MakeScene, name: str, noise: float
     assert agreeing(log)[0] is log
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-6])
+@pytest.mark.parametrize("noise", [0.0, 1e-7, 1e-6, 1e-5, 4e-5])
 def test_forces_of_a_press_at_a_slant_stay_as_they_are(noise: float) -> None:
     """They rise together, so that crosstalk would explain the little that no stiffness does exactly."""
     scene = Scene(
@@ -58,11 +58,27 @@ def test_forces_of_a_press_at_a_slant_stay_as_they_are(noise: float) -> None:
             FiniteLayer(thickness=3e-3),
             SensorSampling(points=(14, 14), pitch=1e-3, frame_rate=30.0),
             MarkerNoise(scale=noise),
-            ForceNoise(scale=2e3 * noise),
+            ForceNoise(scale=min(10.0 * noise, 2e-4)),
         ),
     )
     log = simulate(scene, seed=1)
     assert agreeing(log)[0] is log
+
+
+@pytest.mark.parametrize("delay", [2, 3])
+def test_no_lag_is_taken_under_a_load_that_comes_again_and_again(scene: MakeScene, delay: int) -> None:
+    """Markers that are a little late go with the forces of the period before as well."""
+    log = scene("cond1", marker_noise=1e-6, force_noise=2e-3)
+    assert log.force is not None
+    middle, frames = len(log) // 2, np.arange(240)
+    swing = np.sin(2.0 * np.pi * 2.0 * frames / 30.0)
+    displacement, force = (
+        field[middle] * (1.0 + 0.3 * part[:, None, None, None])
+        for field, part in ((log.displacement, np.roll(swing, delay)), (log.force, swing))
+    )
+    none = {"normal": None, "object_pose": None, "truth": None}
+    swung = GraspLog(frames / 30.0, log.position, displacement, log.element_area, force=force, **none)
+    assert lag_of_forces(changes_of(swung)) == 0.0
 
 
 def test_depth_alone_says_nothing_of_forces_along_the_surface(scene: MakeScene) -> None:
@@ -77,7 +93,7 @@ def test_a_lag_is_found_to_a_frame(scene: MakeScene, name: str, lag: float) -> N
     assert lag_of_forces(changes_of(log)) == pytest.approx(lag, abs=1.01 / 30.0)
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", sorted({*SCENES} - {"cond4"}))  # which only turns: no sum along the surface shows it
 def test_crosstalk_is_found_to_a_hundredth_beside_a_lag(scene: MakeScene, name: str) -> None:
     log = leaking(scene(name, marker_noise=1e-5, force_noise=2e-3), 0.3, -0.1)
     np.testing.assert_allclose(crosstalk_of(changes_of(log)), [0.3, -0.1], rtol=0.0, atol=0.012)
