@@ -282,6 +282,16 @@ def test_normals_of_the_deformed_shape_lean_nowhere(long_ramp: GraspLog) -> None
     assert "leaning normals" not in names(shaped.take(slice(30, None)))
 
 
+def test_a_gripper_that_reports_late_and_a_contact_beside_the_elements_contradict_nothing(long_ramp: GraspLog) -> None:
+    log = gripped(long_ramp)
+    assert log.gripper_force is not None
+    late = np.interp(log.time - 0.1, log.time, log.gripper_force)
+    assert "gripper's force differs" not in names(replace(log, gripper_force=late))
+    fields = {name: getattr(log, name)[:, : log.grid[0] // 2] for name in ("displacement", "force", "normal")}
+    half = replace(log, position=log.position[: log.grid[0] // 2], truth=None, contact=None, **fields)
+    assert "gripper's force differs" not in names(half)
+
+
 @pytest.mark.parametrize(
     ("factor", "creep", "is_found"),
     [(1.0, 0.0, False), (1.05, 0.0, False), (0.7, 0.0, True), (1.3, 0.0, True), (0.102, 0.0, True), (1.0, 0.2, True)],

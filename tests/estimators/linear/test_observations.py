@@ -93,3 +93,9 @@ def test_clusters_are_grasps_else_elements_else_stretches_of_time(samples: Make)
 def test_an_option_out_of_range_is_refused(samples: Make, option: str, value: object) -> None:
     with pytest.raises(estimators.InvalidSamples, match=option):
         estimators.fit(samples(50), **{option: value})
+
+
+def test_merged_moments_of_several_grasps_are_not_those_of_one(samples: Make) -> None:
+    one, other = (estimators.Moments.from_samples(samples(50)) for _ in range(2))
+    kinds = [estimators.fit(data, "conjugate").diagnostics["cluster_kind"] for data in (one, one.merge(other))]
+    assert kinds == ["none", "merged"]

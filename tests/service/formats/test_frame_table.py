@@ -109,6 +109,14 @@ def test_a_column_that_is_missing_is_no_element_less(tmp_path: Path) -> None:
         formats.read(path, "text/csv", mapping=json.dumps(mapping))
 
 
+def test_elements_may_be_numbered_by_row_and_column(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,P11_X,P12_X,P21_X,P22_X\n0,0,0,0,0\n1,1e-4,2e-4,3e-4,4e-4\n")
+    mapping = {"time": "t", "displacement": ["P*_X"] * 3, "grid": [2, 2], "pitch": 1e-3}
+    log = formats.read(path, "text/csv", mapping=json.dumps(mapping))
+    assert log.displacement[1, ..., 0].tolist() == [[1e-4, 2e-4], [3e-4, 4e-4]]
+
+
 def test_elements_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     order = (10, 2, 1, 0, 3, 4, 5, 6, 7, 8, 9, 11)
     lines = [["t", *(f"u{k}" for k in order)], *([t, *map(str, order)] for t in "01")]
