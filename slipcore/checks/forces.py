@@ -59,10 +59,10 @@ def _beside_the_contact(seen: Subject) -> tuple[BoolArray, BoolArray, BoolArray,
 
     What leaks out to them of a contact's forces is alike in both.
     """
-    from scipy.ndimage import binary_dilation
+    from scipy.ndimage import maximum_filter
 
     touching = seen.history.contact.mean(axis=0) > seen.limits.passing_touch
-    free = ~binary_dilation(touching, np.ones((3, 3), bool), iterations=seen.limits.free_distance)
+    free = ~maximum_filter(touching, 2 * seen.limits.free_distance + 1, mode="constant")
     free &= np.count_nonzero(free) >= seen.limits.least_free
     order = np.cumsum(seen.held)
     fifth = max(seen.limits.least_rest, int(order[-1]) // 5)
