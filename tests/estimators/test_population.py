@@ -162,3 +162,14 @@ def test_extremes_of_what_a_material_tells_give_a_prior(model: FrictionModel, sc
     prior = population_scatter([replace(model, scales=replace(model.scales, between_grasps=scale))] * 3)
     assert 0.01 < prior.scale < 1.0
     assert 1.0 <= prior.degrees_of_freedom < 30.0
+
+
+def test_a_material_is_none_of_the_population_by_the_ratio_of_both_densities() -> None:
+    """Of a τ that is known to be A: log-uniform over all scales, against half-normal of scale A."""
+    known = np.zeros(len(population.SIZES))
+    known[40] = 1.0
+    member, outlier = population._ratios(Scale(population.SIZES[40], 1e9), known)
+    assert member[40] == pytest.approx(1.0, rel=1e-12)
+    log_uniform = 1.0 / np.log(POPULATION.most / POPULATION.least)
+    half_normal = 2.0 * np.exp(-0.5) / np.sqrt(2.0 * np.pi)
+    assert outlier == pytest.approx(log_uniform / half_normal, rel=0.01)

@@ -284,7 +284,7 @@ def _half_the_frames(plan: Plan) -> Plan:
 
 def _left_by_half(longer: GraspLog, log: GraspLog) -> Difference:
     """What the load steps of a log leave, by one of half the frames: it falls in proportion to them at least."""
-    return difference(longer, log.take(slice(0, 2 * len(longer) - 1, 2)))
+    return difference(longer, log.take(slice(0, None, 2)))
 
 
 def _left_by(log: GraspLog, shorter: GraspLog) -> Difference:
