@@ -74,3 +74,9 @@ def test_deep_below_a_cell_only_its_force_counts() -> None:
 def test_a_depth_outside_the_body_is_refused(depth: float) -> None:
     with pytest.raises(InvalidInput, match="depth below the surface"):
         Interior(YOUNG, 0.3, H, depth)
+
+
+@pytest.mark.parametrize(("modulus", "ratio", "name"), [(0.0, 0.3, "young_modulus"), (YOUNG, 0.51, "poisson_ratio")])
+def test_a_body_that_cannot_be_is_refused(modulus: float, ratio: float, name: str) -> None:
+    with pytest.raises(InvalidInput, match=name):
+        Interior(modulus, ratio, H, 0.5 * H)
