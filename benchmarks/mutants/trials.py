@@ -25,7 +25,7 @@ from collections.abc import Callable
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from types import CodeType, SimpleNamespace
+from types import CodeType, FunctionType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -150,16 +150,23 @@ def _say(answer: Any) -> None:
 
 
 def _names(item: pytest.Item) -> list[str]:
-    """A test's fixtures, what it and these use by name, and the words of their texts: commands, columns, addresses."""
+    """A test's fixtures, what it, these and functions of its file use by name, and the words of their texts: commands,
+    columns, addresses.
+    """
     fixtures = [made[-1].func for made in item._fixtureinfo.name2fixturedefs.values()]  # type: ignore[attr-defined]
     functions = [getattr(item, "function", None), *fixtures]
-    waiting = [function.__code__ for function in functions if hasattr(function, "__code__")]
+    waiting = [(function.__code__, function.__globals__) for function in functions if hasattr(function, "__code__")]
     found = set(item._fixtureinfo.name2fixturedefs)  # type: ignore[attr-defined]
+    seen = set[CodeType]()
     while waiting:
-        code = waiting.pop()
+        code, around = waiting.pop()
+        seen.add(code)
         found.update(code.co_names)
         found.update(word for text in code.co_consts if isinstance(text, str) for word in re.findall(r"\w+", text))
-        waiting += [part for part in code.co_consts if isinstance(part, CodeType)]
+        helpers = [around[name] for name in code.co_names if isinstance(around.get(name), FunctionType)]
+        own = [helper.__code__ for helper in helpers if helper.__globals__ is around]
+        parts = [part for part in code.co_consts if isinstance(part, CodeType)]
+        waiting += [(part, around) for part in [*own, *parts] if part not in seen]
     return sorted(found)
 
 

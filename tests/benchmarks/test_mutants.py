@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from coverage.numbits import nums_to_numbits
@@ -18,6 +20,7 @@ from benchmarks.mutants.nearby import Nearby
 from benchmarks.mutants.page import tables
 from benchmarks.mutants.reach import Reach
 from benchmarks.mutants.scratch_copy import ScratchCopy
+from benchmarks.mutants.trials import _names
 from benchmarks.mutants.verdicts import Court, Verdict
 from benchmarks.pages import renew
 
@@ -358,3 +361,11 @@ def test_a_new_page_has_a_place_for_each_table(tmp_path: Path) -> None:
     page.write_text(PAGE.read_text())
     renew(page, tables([], {}, {}, {"slipcore": 20}))
     assert "| slipcore | 20 | 0 | 0 | 0 | 0 | 0 | – | – |" in page.read_text()
+
+
+def test_a_test_uses_what_functions_of_its_file_use() -> None:
+    """``change`` asks for ``edits``, which the test itself does not name."""
+    test = test_the_page_tells_score_and_survivors
+    item = SimpleNamespace(_fixtureinfo=SimpleNamespace(name2fixturedefs={}), function=test)
+    assert "edits" not in test.__code__.co_names
+    assert {"change", "edits", "tables"} <= set(_names(cast("pytest.Item", item)))

@@ -7,9 +7,10 @@ import pytest
 from scipy import stats
 
 import estimators
-from estimators import ChangeAlarm, InvalidSamples, Moments
+from estimators import ChangeAlarm, InvalidSamples, Moments, Scale, Scales
 from estimators.change_alarm import TAUS, grasp_level, noticeable, watched
 from estimators.defaults import PRIOR
+from estimators.linear.grasp_statistics import GraspStatistics
 from slipcore.samples import FrictionSamples
 
 
@@ -23,7 +24,7 @@ def alarm_of(levels: list[float], variance: float = 1e-4) -> ChangeAlarm:
 def test_evidence_is_the_ratio_of_two_integrals() -> None:
     """Level, shift and τ by quadrature in place of closed forms."""
     levels, shift, variance, start = np.array([1.02, 0.97, 1.01, 0.83, 0.86]), 0.2, 1e-4, 3
-    side = np.linspace(-0.6, 0.6, 401)
+    side = np.linspace(-0.6, 0.6, 161)
     m, delta = np.meshgrid(0.95 + side, side)
     cell = (side[1] - side[0]) ** 2
 
@@ -168,3 +169,60 @@ def test_a_level_that_is_no_number_is_refused(level: float, variance: float) -> 
 def test_settings_that_cannot_be_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InvalidSamples, match=next(iter(settings))):
         ChangeAlarm.init(**settings)
+
+
+def law(scale: float = 0.0, scales: Scales | None = None) -> estimators.FrictionModel:
+    """μ = 0.5 + 10 v − f_n."""
+    seen = estimators.Domain((0.0, 1e-2), (0.0, 0.2))
+    cost = estimators.Cost(0.0, 0.0)
+    return estimators.FrictionModel(
+        "ols",
+        np.array([0.5, 10.0, -1.0]),
+        np.zeros((3, 3)),
+        scale,
+        9,
+        6.0,
+        6.0,
+        seen,
+        np.ones(3, bool),
+        1e-6,
+        cost,
+        scales=scales,
+    )
+
+
+def two_places(share: float = 1.0) -> GraspStatistics:
+    """Friction of 0.4 and 0.6 where 0.5 and 0.4 are expected, with weights of 1 and 4."""
+    mean = np.array([[1e-2, 0.1, 0.4], [0.0, 0.1, 0.6]])
+    none = np.zeros((2, 3, 3))
+    return GraspStatistics(np.ones(2), np.array([1.0, 4.0]), mean, none, none[0], 5.0, 17.0, share=share)
+
+
+def test_a_level_is_the_least_squares_factor_of_the_law() -> None:
+    """Without scatter all places count alike, each known to a billionth of 0.6."""
+    level, variance = grasp_level(law(), two_places())
+    assert level == pytest.approx((0.5 * 0.4 + 0.4 * 0.6) / (0.25 + 0.16), rel=1e-12)
+    assert variance == pytest.approx((1e-9 * 0.6) ** 2 / 0.41, rel=1e-9)
+    level, variance = grasp_level(law(0.1), two_places(share=0.5))
+    assert variance == pytest.approx(0.01 / (0.5 * 0.41), rel=1e-9)
+
+
+def test_a_place_is_as_sure_as_places_and_its_own_samples_scatter() -> None:
+    """Places by 0.3, samples by 0.4: of weights 1 and 4 the variances are 0.25 and 0.13."""
+    scatter = Scales(*(Scale(value, 9.0) for value in (0.7, 0.3, 0.4)))
+    level, variance = grasp_level(law(9.0, scatter), two_places())
+    information = 0.25 / 0.25 + 0.16 / 0.13
+    assert variance == pytest.approx(1.0 / information, rel=1e-12)
+    assert level == pytest.approx((0.2 / 0.25 + 0.24 / 0.13) / information, rel=1e-12)
+
+
+def test_only_the_last_thousand_grasps_are_kept() -> None:
+    alarm = ChangeAlarm(levels=tuple(range(1000)), variances=(1.0,) * 1000).step(7.0, 2.0)
+    assert (len(alarm.levels), alarm.levels[0], alarm.levels[-1]) == (1000, 1, 7.0)
+    assert (len(alarm.variances), alarm.variances[-1]) == (1000, 2.0)
+
+
+def test_a_change_is_the_mean_since_over_the_mean_before() -> None:
+    alarm = alarm_of([1.0, 1.02, 0.98, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5])
+    assert (alarm.changed, alarm.since) == (True, 5)
+    assert alarm.change == pytest.approx(-0.5, rel=1e-12)

@@ -1,6 +1,7 @@
 """The sequential test: a stated rate of false alarms however long it looks, and a prompt answer to a change."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,3 +80,31 @@ def test_the_former_name_of_the_e_value_still_works(samples: Make) -> None:
     detector = ChangeDetector(estimators.fit(samples())).step(2e-3, 0.1, 0.5)
     with pytest.warns(DeprecationWarning, match="e_value"):
         assert detector.evidence == detector.e_value
+
+
+def test_settings_at_the_ends_of_their_ranges_are_taken(samples: Make) -> None:
+    model = estimators.fit(samples(50))
+    assert ChangeDetector(model, alarm=1e-9, spread=1e-9, reset_after=1).reset_after == 1
+
+
+def test_a_sum_starts_afresh_after_so_many_samples(samples: Make) -> None:
+    detector = ChangeDetector(estimators.fit(samples(500)), reset_after=2)
+    first = detector.step(1e-3, 0.05, 0.4)
+    second = first.step(1e-3, 0.05, 0.4)
+    assert (first.count, second.count) == (1, 2)
+    assert second.total == pytest.approx(2.0 * first.total, rel=1e-12)
+    third = second.step(1e-3, 0.05, 0.4)
+    assert (third.count, third.total) == (1, first.total)
+
+
+def test_a_deviation_is_the_normal_score_of_a_sample(samples: Make) -> None:
+    """Of coefficients that are known, on so many degrees of freedom: as likely above as that of the normal."""
+    model = replace(estimators.fit(samples(50)), covariance=np.zeros((3, 3)), scale=0.1, scatter_degrees_of_freedom=5.0)
+    expected = float(model.coefficients @ [1.0, 1e-3, 0.05])
+    for above in (0.25, -0.25, 0.0):
+        score = stats.norm.isf(stats.t(5.0).sf(above / 0.1))
+        assert ChangeDetector(model)._deviation(1e-3, 0.05, expected + above) == pytest.approx(score, abs=1e-9)
+    unsure = replace(model, covariance=np.diag([0.03, 0.0, 0.0]))  # 0.2² in all
+    assert ChangeDetector(unsure)._deviation(1e-3, 0.05, expected + 0.25) == pytest.approx(
+        stats.norm.isf(stats.t(5.0).sf(1.25)), rel=1e-9
+    )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special
 
-from slipcore.contact.elasticity.bonded_layer import LayerBase, radial_functions
+from slipcore.contact.elasticity.bonded_layer import LayerBase, _points, radial_functions
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, HalfSpace
 from slipcore.contact.elasticity.operator import Operators
@@ -158,3 +158,12 @@ def test_a_layer_costs_no_application_by_itself() -> None:
         counts.append(solver.count.normal + solver.count.tangential)
         assert solver.count.coupling == 0
     assert counts[0] <= 1.25 * counts[1]  # the same solver on other kernels; only its iterations differ
+
+
+@pytest.mark.parametrize("pitch", [0.1, 0.25, 1.0, 4.0, 8.0])
+def test_points_over_a_cell_are_as_many_as_a_pole_two_thicknesses_away_needs(pitch: float) -> None:
+    """To 1e-12 of ∫ dx/(x² + 4) over the cell; two fewer miss it."""
+    for count, is_met in ((_points(pitch), True), (_points(pitch) - 2, False)):
+        node, weight = np.polynomial.legendre.leggauss(count)
+        found = weight @ (0.5 * pitch / ((0.5 * pitch * node) ** 2 + 4.0))
+        assert (abs(found / np.arctan(0.25 * pitch) - 1.0) < 2e-12) == is_met
