@@ -1,5 +1,6 @@
 import inspect
 import re
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,16 @@ from service.formats.reading import Readers
 from service.jobs.worker import StoreConfig
 from service.settings import Settings, complaints, unknown_variables
 
-DOCUMENTED = dict(
-    re.findall(r"^\| `STICTION_(\w+)` \| (.+?) \|", (Path(__file__).parents[2] / "docs/settings.md").read_text(), re.M)
+ROWS = re.findall(
+    r"^\| `STICTION_(\w+)` \| (.+?) \| (.+?) \|",
+    (Path(__file__).parents[2] / "docs/settings.md").read_text(encoding="utf-8"),
+    re.M,
 )
+DOCUMENTED = {name: default for name, default, _ in ROWS}
+VALID = {name.lower(): valid for name, _, valid in ROWS}
+BYTES = {"MiB": 2**20, "PiB": 2**50, "EiB": 2**60}
+NUMBER = r"[\d.,]+[⁰¹²³⁴-⁹]*"
+SCHEMA = Settings.model_json_schema()["properties"]
 
 
 UNSET = {
@@ -43,6 +51,29 @@ def test_the_documented_default_is_the_default(name: str) -> None:
     shown = DOCUMENTED[name.upper()].replace("`", "")
     expected = UNSET[name] if default is None else str(default).lower() if isinstance(default, bool) else str(default)
     assert shown.startswith(expected.removesuffix(".0"))
+
+
+def bounds(name: str) -> dict[str, float]:
+    """Of a number, as JSON Schema names them."""
+    told = SCHEMA[name] | SCHEMA[name].get("anyOf", [{}])[0]
+    return {each: told[each] for each in ("minimum", "exclusiveMinimum", "maximum") if each in told}
+
+
+def quantity(text: str) -> float:
+    """Such as ``1048576``, ``10¹²``, ``1,000,000`` or ``64 MiB``."""
+    number, unit = re.fullmatch(rf"({NUMBER}) ?([a-zA-Z]*)", text).groups()  # type: ignore[union-attr]
+    base, power = re.fullmatch(r"([\d.]+?)([⁰¹²³⁴-⁹]*)", number.replace(",", "")).groups()  # type: ignore[union-attr]
+    return float(base) ** int(unicodedata.normalize("NFKC", power) or 1) * BYTES.get(unit, 1)
+
+
+@pytest.mark.parametrize("name", [name for name in Settings.model_fields if bounds(name)])
+def test_the_documented_range_is_the_one_that_is_kept(name: str) -> None:
+    above, least, most = re.match(  # type: ignore[union-attr]
+        rf"(above )?({NUMBER}(?: byte| .iB)?)(?: \(.+?\))? to ({NUMBER}(?: .iB)?)", VALID[name]
+    ).groups()
+    kept = bounds(name)
+    assert kept.pop("exclusiveMinimum" if above else "minimum") == quantity(least)
+    assert kept == {"maximum": quantity(most)}
 
 
 def test_parts_without_settings_do_as_with_the_defaults_of_these() -> None:
