@@ -72,6 +72,25 @@ def test_smoothing_is_over_neighbours_and_not_over_time(log: GraspLog) -> None:
     assert seen(faults.smoothed(0.8), replace(log, force=None)).force is None
 
 
+def test_noise_after_smoothing_is_not_smoothed(log: GraspLog) -> None:
+    still = replace(log, displacement=np.zeros_like(log.displacement))
+    noise = seen(faults.smoothed_then_noisy(0.8, 2e-5), still).displacement
+    assert noise.std() == pytest.approx(2e-5, rel=0.02)
+    assert abs((noise[:, 1:] * noise[:, :-1]).mean()) < 0.02 * noise.var()
+    smooth = seen(faults.smoothed(0.8), log)
+    told = seen(faults.smoothed_then_noisy(0.8, 0.0), log)
+    np.testing.assert_array_equal(told.displacement, smooth.displacement)
+    np.testing.assert_array_equal(forces(told), forces(smooth))
+
+
+def test_lagging_markers_are_told_as_they_were_and_the_others_as_they_are(log: GraspLog) -> None:
+    displacement = seen(faults.lagging(0.4, 0.035), log).displacement
+    lags = (displacement != log.displacement).any(axis=(0, -1))
+    assert 0.2 < lags.mean() < 0.6
+    np.testing.assert_array_equal(displacement[4:, lags], log.displacement[:-4, lags])
+    np.testing.assert_array_equal(displacement[:4, lags], log.displacement[[0] * 4][:, lags])
+
+
 def test_lost_markers_are_said_to_be_lost_from_the_beginning(log: GraspLog) -> None:
     observed = seen(faults.lost(0.3), log).observed
     assert observed is not None

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from service.cli import main
 from service.cli.exit_codes import INPUT_REFUSED
 from service.jobs import campaign
 from service.slip_benchmark import folder as files
-from service.slip_benchmark import scenes
+from service.slip_benchmark import making, scenes
 from service.slip_benchmark.folder import Prediction, Truth, input_path, prediction_path, truth_path
 from service.slip_benchmark.kinds import KINDS, faults_of, kinds_named, pairing
 from service.slip_benchmark.making import make
@@ -32,6 +33,7 @@ from slipcore.contact.effects.object_motion import ObjectMotion
 from slipcore.contact.effects.torsion import Torsion
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.errors import InvalidInput
+from slipcore.frames import FrictionLaw
 from stiction_client import container
 
 PILLARS = kinds_named(["pillars 3x3"])
@@ -265,6 +267,76 @@ def test_a_prediction_of_the_wrong_shape_is_named(arrays: dict[str, Any], messag
         files.read_prediction(tmp_path / "said.npz", (7, 3, 3))
 
 
+@pytest.mark.parametrize("bound", [0.0, 1.0])
+def test_a_probability_may_be_as_small_and_as_large_as_they_come(bound: float, tmp_path: Path) -> None:
+    arrays = {"slip": np.zeros((7, 3, 3), bool), "probability": np.full((7, 3, 3), bound)}
+    files.write_arrays(tmp_path / "said.npz", arrays)
+    said = files.read_prediction(tmp_path / "said.npz", (7, 3, 3))
+    assert said.probability is not None
+    np.testing.assert_array_equal(said.probability, bound)
+    assert (said.friction, said.force, said.macro_slip) == (None, None, None)
+
+
+def test_a_truth_of_another_version_is_refused_by_the_member_that_it_lacks(mine: Path) -> None:
+    path = truth_path(mine, "0000")
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive if name != "friction_law"}
+    files.write_arrays(path, arrays)
+    with pytest.raises(InvalidInput, match="is without friction_law; allowed: a truth file of this version"):
+        files.read_truth(path)
+
+
+@pytest.mark.parametrize("left", [0, 100, -50])
+def test_a_file_is_whole_only_with_all_that_was_written(mine: Path, left: int) -> None:
+    path = truth_path(mine, "0000")
+    assert files.is_whole(path)
+    assert not files.is_whole(path.parent)
+    path.write_bytes(path.read_bytes()[:left])
+    assert not files.is_whole(path)
+
+
+def test_the_acting_friction_is_the_law_at_the_force_weighted_mean_of_what_slips() -> None:
+    force = np.zeros((1, 1, 3, 3))
+    force[..., 2] = [[[-1.0, -3.0, 5.0]]]  # the last one is pulled: it bears no friction
+    law = FrictionLaw((0.5, -0.8, -0.04))
+    both, none = np.ones((1, 1, 3), bool), np.zeros((1, 1, 3), bool)
+    mean = (1.0 + 9.0) / 4.0
+    assert making._acting(law, force, both) == pytest.approx(0.5 - 0.04 * mean)
+    assert making._acting(law, force, none) == pytest.approx(0.5 - 0.04 * mean)
+    assert making._acting(law, force, both & [True, False, True]) == pytest.approx(0.46)
+
+
+def test_sensors_have_no_noise_of_forces_where_their_markers_have_none(made: Path) -> None:
+    noise = [(entry.marker_noise, entry.force_noise) for entry in files.read_manifest(made).scenes]
+    assert noise == [(0.0, 0.0), (1e-6, 1e-2)]
+
+
+def test_results_are_those_of_the_last_run_each_method_once(mine: Path) -> None:
+    (stale := mine / files.RESULTS / "force_ratio" / "9999.npz").parent.mkdir(parents=True)
+    stale.touch()
+    ran = list(run(Here(), mine, ["force_ratio", "force_ratio"], None))
+    assert [(each.method, each.scene) for each in ran] == [("force_ratio", scene) for scene in ("0000", "0001")]
+    assert not stale.exists()
+    told = json.loads((mine / "results/force_ratio/run.json").read_text(encoding="utf-8"))
+    assert told["seconds"] == pytest.approx(sum(each.seconds for each in ran))
+    assert (told["method"], told["by"], told["refused"]) == ("force_ratio", f"stiction {version('stiction')}", {})
+
+
+def test_the_end_of_what_a_failed_program_said_is_kept(made: Path, tmp_path: Path) -> None:
+    (script := tmp_path / "loud.sh").write_text('printf "%0400d" 7 >&2; exit 3', encoding="utf-8")
+    with pytest.raises(InvalidInput, match=f"it said: {'0' * 299}7; allowed: code 0"):
+        Program("loud", f"sh {script}", 5.0).predict(input_path(made, "0000"), tmp_path / "said.npz")
+    with pytest.raises(InvalidInput, match="ended by code 1; it said: nothing"):
+        Program("mute", "false", 5.0).predict(input_path(made, "0000"), tmp_path / "said.npz")
+
+
+def test_scoring_says_how_far_it_is(mine: Path) -> None:
+    say(mine, "stick", slip=lambda t: np.zeros_like(t.slip))
+    told: list[tuple[float, str]] = []
+    score(mine, lambda part, what: told.append((part, what)))
+    assert told == [(0.5, "1 of 2 scenes scored"), (1.0, "2 of 2 scenes scored")]
+
+
 def test_a_detector_is_run_on_the_inputs_alone_and_one_without_forces_is_told_of(mine: Path) -> None:
     shutil.rmtree(mine / "truth")
     truth = mine / "truth"
@@ -308,7 +380,14 @@ def test_a_program_predicts_or_its_failure_is_told(mine: Path, tmp_path: Path) -
 
 @pytest.mark.parametrize(
     ("name", "command", "message"),
-    [("a/b", "true", "name is 'a/b'"), ("filter", "true", "no detector of this"), ("x", "no-such-program", "is there")],
+    [
+        ("a/b", "true", "name is 'a/b'"),
+        ("a" * 62, "true", "name is 'a"),
+        ("filter", "true", "no detector of this"),
+        ("x", "no-such-program", "is there"),
+        ("x", "", "external is ''; allowed: a command whose program is there"),
+        ("x", "sh 'unended", r"allowed: a command \(No closing quotation\)"),
+    ],
 )
 def test_a_program_that_cannot_be_run_is_refused(made: Path, name: str, command: str, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
