@@ -8,12 +8,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from db.records import Finding
+from db.records import ContactFriction, Finding
 from service.domain.doubtful_logs import with_doubts
 from service.domain.grasp_report import inspect_grasp, report_of_log, report_of_stored
 from service.domain.stored_results import encode_history, encode_samples
 from service.formatting import NOTHING
-from service.report.grasp import InspectedGrasp, grasp_report
+from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Report, render
 from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -52,11 +52,13 @@ def test_a_log_is_reported_as_it_is_seen(log: GraspLog, seen: InspectedGrasp) ->
     assert without_seconds(report_of_log(log, "grasp.npz")) == without_seconds(grasp_report(seen))
 
 
-def test_what_was_detected_stands_in_a_table(seen: InspectedGrasp) -> None:
-    def told(inspected: InspectedGrasp) -> dict[str, str]:
-        (table,) = grasp_report(inspected).sections[-1].tables
-        return dict(table.rows)
+def told(inspected: InspectedGrasp) -> dict[str, str]:
+    """What was detected, by its name."""
+    (table,) = grasp_report(inspected).sections[-1].tables
+    return dict(table.rows)
 
+
+def test_what_was_detected_stands_in_a_table(seen: InspectedGrasp) -> None:
     found = told(seen)
     assert found["detector"] == seen.detection.method
     assert (int(found["onsets of slip"]), int(found["ends of slip"])) == (seen.detection.onsets, seen.detection.ends)
@@ -77,6 +79,31 @@ def test_a_grasp_without_forces_says_why_there_is_no_friction(log: GraspLog) -> 
     assert "the log has no forces" in report.lead
     assert not [fact for fact in report.facts if fact.name.startswith("Friction coefficient")]
     assert "Friction model" not in [section.heading for section in report.sections]
+
+
+def test_friction_of_the_whole_contact_is_a_bound_or_a_value_with_its_interval(seen: InspectedGrasp) -> None:
+    name = "friction of the whole contact"
+    bound = ContactFriction(0.45, 0.45, None, True, "nothing slips as a whole")
+    known = ContactFriction(0.5, 0.45, 0.55, False, "gross slip")
+    for found, text in (
+        (None, NOTHING),
+        (bound, "at least 0.450: nothing slips as a whole"),
+        (known, "0.500 (0.450 … 0.550): gross slip"),
+    ):
+        assert told(replace(seen, detection=replace(seen.detection, contact_friction=found)))[name] == text
+
+
+def test_what_a_log_holds_is_told_with_its_unit_and_a_sensor_without_a_name_as_none() -> None:
+    assert [fact.value for fact in grasp_facts("left", 82, 2.75, (8, 6))] == ["left", "82 in 2.75 s, of 8 × 6 elements"]
+    assert grasp_facts("", 82, 2.75, (8, 6))[0].value == NOTHING
+
+
+def test_gross_slip_is_counted_of_the_frames_in_contact(seen: InspectedGrasp) -> None:
+    facts = {fact.name: fact.value for fact in grasp_report(seen).facts}
+    assert facts["Frames of gross slip"] == (
+        f"{seen.detection.macro_slip_frames} of {seen.detection.contact_frames} in contact"
+    )
+    assert facts["Findings against it"] == "0"
 
 
 def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> None:

@@ -3,12 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from service.formatting import number
 from service.report.material import material_report
 from service.report.page import render
 from service.report.pictures import friction_sections, marginals
+from service.report.wording import coefficient_table
 from slipcore.samples import FrictionSamples
 from stiction_client.model import Cost, FrictionModel
-from stiction_client.records import Material, NextGrasp
+from stiction_client.records import Detection, Finding, GraspLogReceipt, Job, Material, NextGrasp, Withdrawal
 from stiction_client.support import Domain
 
 MODEL = FrictionModel(
@@ -50,6 +52,52 @@ def test_a_material_without_a_model_says_what_is_missing(material: Material) -> 
     report = material_report(replace(material, models={}, recommended=None), [], None)
     assert "no model of its friction yet" in report.lead
     assert list(report.pictures) == []
+
+
+JOB = Job("1", "ingest", "done", None, None, {}, "a", "paper", 3, "2026-01-01T00:00:00+00:00", None)
+SEEN = Detection("filter", 1e-6, 0.25, 40, 2, {}, 321, 0.1, (Finding("slow frames", "seen", "faster"),))
+LOG = GraspLogReceipt("a", "b", 9, "npz", "paper", "left", 82, 2.75, (8, 8), "2026-01-02T03:04:05.678+00:00", JOB, SEEN)
+
+
+def test_each_log_is_a_row_with_what_became_of_it(material: Material) -> None:
+    withdrawn = replace(LOG, detection=None, withdrawal=Withdrawal("2026-01-03", "wrong", None))
+    twice = replace(SEEN, findings=(*(SEEN.findings or ()), Finding("zero drift", "seen", "tare")))
+    report = material_report(material, [LOG, withdrawn, replace(LOG, detection=twice)], None)
+    (grasps,) = (section for section in report.sections if section.heading == "Grasps")
+    (table,) = grasps.tables
+    assert table.caption == "The newest 3 of 3 logs"
+    told = ["2026-01-02 03:04:05", "left", "82", "2.75 s"]
+    assert table.rows[0] == [*told, "done", "321", "0.250", "slow frames"]
+    assert table.rows[1] == [*told, "withdrawn", "", "", ""]
+    assert table.rows[2][-1] == "slow frames, zero drift"
+    assert all(len(row) == len(table.columns) for row in table.rows)
+
+
+def test_models_that_disagree_are_told_before_what_to_record_but_for_outdated_ones(material: Material) -> None:
+    other = replace(MODEL, method="ols", coefficients=np.array([0.9, 0.1, -0.02]))
+    report = material_report(replace(material, models={"ols": other, **material.models}), [], PROBE)
+    assert report.steps[0].startswith("methods disagree by more than their intervals allow: ols expects ")
+    assert [step[:11] for step in report.steps[1:]] == ["Record next", "Ask how har"]
+    (model,) = (section for section in report.sections if section.heading == "Model")
+    assert [row[0] for row in model.tables[0].rows] == ["hierarchical", "ols"]  # the recommended one first
+    outdated = replace(other, outdated=True)
+    steps = material_report(replace(material, models={"ols": outdated, **material.models}), [], None).steps
+    assert [step[:11] for step in steps] == ["Ask how har"]
+
+
+def test_a_material_says_of_which_force_its_friction_is_and_what_a_new_observation_may_be(material: Material) -> None:
+    facts = {fact.name: fact.value for fact in material_report(material, [], None).facts}
+    assert facts["Friction coefficient μ, at 0.0700 N an element"] == "0.449"
+    low, high = (MODEL.predict(0.0, 0.07, quantile=level) for level in (0.05, 0.95))
+    assert facts["90 % of new observations"] == f"{low:.3f} … {high:.3f}"
+
+
+def test_remarks_of_models_are_told_once_in_the_caption() -> None:
+    noted = replace(MODEL, diagnostics={"unknown_velocity": "v is unknown", "scatter_prior": "scatter of others"})
+    table = coefficient_table({"a": noted, "b": noted, "c": MODEL})
+    assert table.caption == "Estimates and 95 % intervals; scatter of others; v is unknown"
+    assert [row[-1] for row in table.rows] == ["200"] * 3
+    assert table.rows[0][4] == f"0.0200 ({' … '.join(number(end) for end in MODEL.scale_interval(0.95))})"
 
 
 def test_the_picture_of_the_marginals_has_the_intervals_of_the_table() -> None:
