@@ -121,7 +121,7 @@ class Court:
         reached = self._tests_of(edit)
         spent, unsteady = 0.0, set[str]()
         while True:
-            tests = self._chosen(edit, reached - unsteady)
+            tests = self._chosen(edit, reached - unsteady, usual=USUAL if importing else 0.0)
             told = self._ask(edit, tests, importing=importing, is_quick=is_quick)
             spent += told["seconds"]
             if not importing and told["needs_import"]:
@@ -148,9 +148,10 @@ class Court:
         tests = self._names or self._copy.collected()
         return {test for test in tests if _file(test) in files and not self._calls(test, STARTS_ANEW)}
 
-    def _chosen(self, edit: Edit, tests: set[str]) -> list[str]:
+    def _chosen(self, edit: Edit, tests: set[str], usual: float) -> list[str]:
         """Tests as far as time allows: first those that name what is changed or something of its module, then others of
-        the files nearby, then the package's in quick files; what starts servers at last.
+        the files nearby, then the package's in quick files; what starts servers at last. Those that were never timed
+        count as ``usual`` s: nothing where a trial ends by itself once its time is used.
         """
         cost: dict[str, float] = defaultdict(float)
         for test in tests:
@@ -173,7 +174,7 @@ class Court:
 
         chosen, spent = [], 0.0
         for test in sorted(tests, key=rank):
-            spent += self._durations.get(test, USUAL)
+            spent += self._durations.get(test, usual)
             if chosen and spent > self._budget:
                 continue
             chosen.append(test)

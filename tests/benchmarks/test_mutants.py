@@ -324,6 +324,14 @@ def test_a_change_made_in_place_is_noticed_as_one_that_is_imported(
     assert not court_in_place.try_mutant(edit.undone()).is_killed
 
 
+def test_only_where_a_trial_does_not_end_by_itself_tests_are_left_out_by_a_guess(copy: ScratchCopy) -> None:
+    names = {f"tests/slipcore/test_program.py::{name}" for name in ("test_a", "test_b", "test_c")}
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", budget=1.5 * verdicts.USUAL)) as court:
+        edit = change(copy, ">", ">=")
+        assert set(court._chosen(edit, names, usual=0.0)) == names
+        assert len(court._chosen(edit, names, usual=verdicts.USUAL)) == 1
+
+
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "verdicts.jsonl"
     first, second = (Verdict("a", 1, by, 2, 0, 0.5) for by in ("", "tests/test_a.py::test_b"))
