@@ -2,9 +2,10 @@
 
 Medians of processor time (one thread, so that other programs matter little) over warm-started load steps of the
 paper's Condition 1 (sphere of 15 mm, F_N = 10 N, F_T to 3.96 N in 50 steps), at residuals of 1e-4 and 1e-8 of the
-largest limit; beside each its floor, the number of convolutions times the cost of one, both measured. Then normal
-contact from nothing, coupled steps, the steps of few cells that audits of control take, whole scenes, and the memory of
-1024 × 1024 cells. Writes contact_speed.json and prints a Markdown table. `--parts` measures only some of that.
+largest limit; beside each its floor, the number of convolutions times the cost of one, both measured, what the
+preconditioner takes likewise, and Newton's rounds. Then normal contact from nothing, coupled steps, the steps of few
+cells that audits of control take, whole scenes, and the memory of 1024 × 1024 cells. Writes contact_speed.json and
+prints a Markdown table. `--parts` measures only some of that.
 """
 
 import argparse
@@ -45,7 +46,8 @@ MIB = 1024.0
 @dataclass(frozen=True, slots=True)
 class Cost:
     """Median ``milliseconds`` (of ``count`` measurements), the ``target``, the ``floor`` that convolutions alone
-    take, their number (``convolutions``, of one component each) and the largest ``residual``.
+    take, their number (``convolutions``, of one component each), the largest ``residual``, Newton's mean ``rounds``
+    a step, and milliseconds of the ``preconditioner``.
     """
 
     what: str
@@ -55,6 +57,8 @@ class Cost:
     convolutions: float | None
     residual: float | None
     count: int
+    rounds: float | None = None
+    preconditioner: float | None = None
 
 
 def bowl(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -93,12 +97,13 @@ def median_time(call: Callable[[], object], repeats: int = 9) -> float:
     return 1e3 * float(np.median(seconds))
 
 
-def convolution(cells: int, poisson: float) -> float:
-    """Milliseconds of one tangential application, two components to two."""
+def convolution(cells: int, poisson: float) -> tuple[float, float]:
+    """Milliseconds of one tangential application, two components to two, and of its preconditioner."""
     grid = Grid.square(cells, width(poisson))
     operator = ElasticOperator((HalfSpace.from_young(YOUNG, poisson),), grid)
     traction = np.random.default_rng(0).standard_normal((2, *grid.shape))
-    return median_time(lambda: operator.tangential(traction), 25)
+    inverse = operator.tangential_inverse
+    return median_time(lambda: operator.tangential(traction), 25), median_time(lambda: inverse(traction), 25)
 
 
 def applications(count: Count) -> float:
@@ -110,14 +115,21 @@ def step_cost(what: str, cells: int, residual: float, target: float | None, pois
     """Median cost of a warm-started step."""
     results = [r for _ in range(3) for r in shear_steps(cells, residual, poisson, coupled)]
     needed = float(np.median([applications(r.applications) for r in results]))
+    one, inverse = convolution(cells, poisson)
+    rounds = float(np.mean([r.iterations for r in results]))
+    # A convolution for the start, and two a round beside those of conjugate gradients; a preconditioner as often as
+    # these, and once more a round.
+    inverted = float(np.mean([r.applications.tangential for r in results])) - 1.0 - rounds
     return Cost(
         what,
         1e3 * float(np.median([r.seconds for r in results])),
         target,
-        needed * convolution(cells, poisson),
+        needed * one,
         needed,
         max(r.residual for r in results),
         len(results),
+        rounds,
+        None if coupled else inverted * inverse,
     )
 
 
@@ -209,10 +221,12 @@ def table(costs: list[Cost]) -> str:
     def text(value: float | None, form: str) -> str:
         return "" if value is None else format(value, form)
 
-    lines = ["| what | median, ms | target | floor | applications | residual |", "|---|---|---|---|---|---|"]
+    columns = ("what", "median, ms", "target", "floor", "preconditioner", "rounds", "applications", "residual")
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for c in costs:
-        row = (c.what, f"{c.milliseconds:.1f}", text(c.target, ".0f"), text(c.floor, ".1f"))
-        lines.append("| " + " | ".join((*row, text(c.convolutions, ".0f"), text(c.residual, ".0e"))) + " |")
+        times = (f"{c.milliseconds:.1f}", text(c.target, ".0f"), text(c.floor, ".1f"), text(c.preconditioner, ".1f"))
+        counts = (text(c.rounds, ".1f"), text(c.convolutions, ".0f"), text(c.residual, ".0e"))
+        lines.append(f"| {' | '.join((c.what, *times, *counts))} |")
     return "\n".join(lines)
 
 

@@ -47,8 +47,9 @@ class Grid:
 
     def points(self) -> tuple[FloatArray, FloatArray]:
         """Cell centres x and y, each [ny, nx] m."""
-        x, y = np.meshgrid(self.x, self.y)
-        return x, y
+        points = np.empty((2, *self.shape))
+        points[0], points[1] = self.x, self.y[:, None]
+        return points[0], points[1]
 
     def part(self, box: Box) -> "Grid":
         """The grid of the cells inside a box."""

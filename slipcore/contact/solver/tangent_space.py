@@ -41,19 +41,21 @@ class TangentSpace:
         self.arm = arm
         self.state = np.empty(limit.shape, dtype=np.int8)
         self.projector, self.onto_circle = np.empty((3, *limit.shape)), np.zeros_like(traction)
-        self.curvature, self.scale = np.zeros(limit.shape), np.empty(limit.shape)
+        # Where the curvature outweighs a cell's own compliance it is what the preconditioner must invert.
+        self.curvature, self.scale = np.zeros(limit.shape), np.ones(limit.shape)
         _classify(
             _flat(traction),
             _flat(slip),
             limit.ravel(),
             stiffness,
-            self.state.ravel(),
-            _flat(self.projector),
-            _flat(self.onto_circle),
-            self.curvature.ravel(),
+            (
+                self.state.ravel(),
+                _flat(self.projector),
+                _flat(self.onto_circle),
+                self.curvature.ravel(),
+                self.scale.ravel(),
+            ),
         )
-        # Where the curvature outweighs a cell's own compliance it is what the preconditioner must invert.
-        np.divide(1.0, np.sqrt(1.0 + self.curvature * stiffness), out=self.scale)
         self.inverse_gram = _inverse(_gram(_flat(self.projector), _flat(arm)) * np.outer(given, given))
 
     def balancing(self, lacking: FloatArray) -> FloatArray:
@@ -111,12 +113,10 @@ def _classify(
     slip: FloatArray,
     limit: FloatArray,
     stiffness: float,
-    state: NDArray[np.int8],
-    projector: FloatArray,
-    onto_circle: FloatArray,
-    curvature: FloatArray,
+    found: tuple[NDArray[np.int8], FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """Fill the last four, as ``TangentSpace`` describes them, for flat fields of n cells."""
+    """Fill state, projector, onto_circle, curvature and scale, as ``TangentSpace`` has them, for flat fields."""
+    state, projector, onto_circle, curvature, scale = found
     for i in range(limit.size):
         radius = limit[i]
         if radius <= 0.0:
@@ -139,6 +139,7 @@ def _classify(
         state[i] = SLIP
         projector[0, i], projector[1, i], projector[2, i] = ny * ny, -nx * ny, nx * nx
         curvature[i] = max(-(slip[0, i] * nx + slip[1, i] * ny), 0.0) / radius
+        scale[i] = 1.0 / np.sqrt(1.0 + curvature[i] * stiffness)
 
 
 @compiled(fastmath=VECTOR)
@@ -197,9 +198,13 @@ def _subtract_rigid(projector: FloatArray, arm: FloatArray, motion: FloatArray, 
 @compiled
 def _balance(projector: FloatArray, arm: FloatArray, inverse_gram: FloatArray, move: FloatArray) -> None:
     """Restrict a move to the space and take off its resultants, in place."""
-    sx, sy, sm = _restrict(projector, arm, move)
-    motion = inverse_gram[:, 0] * sx + inverse_gram[:, 1] * sy + inverse_gram[:, 2] * sm
-    _subtract_rigid(projector, arm, motion, move)
+    _subtract_rigid(projector, arm, _rigid(inverse_gram, _restrict(projector, arm, move)), move)
+
+
+@compiled
+def _rigid(inverse_gram: FloatArray, sums: tuple[float, float, float]) -> FloatArray:
+    """The rigid motion [3] whose part in the space has these resultants."""
+    return inverse_gram[:, 0] * sums[0] + inverse_gram[:, 1] * sums[1] + inverse_gram[:, 2] * sums[2]
 
 
 @compiled
@@ -243,10 +248,26 @@ def _begin(space: Space, slip: FloatArray, made: FloatArray, residual: FloatArra
     for k in range(2):
         for i in range(slip.shape[1]):
             residual[k, i] = slip[k, i] + curvature[i] * made[k, i]
-    _balance(projector, arm, inverse_gram, residual)
-    for k in range(2):
-        for i in range(slip.shape[1]):
-            image[k, i] = scale[i] * residual[k, i]
+    _scale_balanced(projector, arm, scale, _rigid(inverse_gram, _restrict(projector, arm, residual)), residual, image)
+
+
+@compiled(fastmath=VECTOR)
+def _scale_balanced(
+    projector: FloatArray,
+    arm: FloatArray,
+    scale: FloatArray,
+    motion: FloatArray,
+    residual: FloatArray,
+    image: FloatArray,
+) -> None:
+    """Subtract a rigid motion from the residual, in place, and scale that for the preconditioner."""
+    mx, my, yaw = motion[0], motion[1], motion[2]
+    for i in range(residual.shape[1]):
+        dx, dy = mx - arm[1, i] * yaw, my + arm[0, i] * yaw
+        rx = residual[0, i] - projector[0, i] * dx - projector[1, i] * dy
+        ry = residual[1, i] - projector[1, i] * dx - projector[2, i] * dy
+        residual[0, i], residual[1, i] = rx, ry
+        image[0, i], image[1, i] = scale[i] * rx, scale[i] * ry
 
 
 @compiled
@@ -258,14 +279,25 @@ def _advance(
     """
     projector, arm, inverse_gram, curvature, scale = space
     step = size / _stiffen(projector, curvature, direction, image)
-    for k in range(2):
-        for i in range(move.shape[1]):
-            move[k, i] += step * direction[k, i]
-            residual[k, i] += step * image[k, i]
-    _balance(projector, arm, inverse_gram, residual)
-    for k in range(2):
-        for i in range(move.shape[1]):
-            image[k, i] = scale[i] * residual[k, i]
+    sums = _go_on(arm, move, residual, direction, image, step)
+    _scale_balanced(projector, arm, scale, _rigid(inverse_gram, sums), residual, image)
+
+
+@compiled(fastmath=VECTOR)
+def _go_on(
+    arm: FloatArray, move: FloatArray, residual: FloatArray, direction: FloatArray, image: FloatArray, step: float
+) -> tuple[float, float, float]:
+    """Add a step along a direction to the move, and its image to the residual, in place; the resultants of that."""
+    sx = sy = sm = 0.0
+    for i in range(move.shape[1]):
+        move[0, i] += step * direction[0, i]
+        move[1, i] += step * direction[1, i]
+        rx, ry = residual[0, i] + step * image[0, i], residual[1, i] + step * image[1, i]
+        residual[0, i], residual[1, i] = rx, ry
+        sx += rx
+        sy += ry
+        sm += arm[0, i] * ry - arm[1, i] * rx
+    return sx, sy, sm
 
 
 @compiled(fastmath=VECTOR)
@@ -281,18 +313,43 @@ def _stiffen(projector: FloatArray, curvature: FloatArray, direction: FloatArray
     return product
 
 
-@compiled(fastmath=VECTOR)
+@compiled
 def _improve(space: Space, residual: FloatArray, improved: FloatArray) -> float:
     """Scale and balance a preconditioned residual in place; its product with the residual."""
     projector, arm, inverse_gram, _, scale = space
-    for k in range(2):
-        for i in range(improved.shape[1]):
-            improved[k, i] *= scale[i]
-    _balance(projector, arm, inverse_gram, improved)
-    product = 0.0
-    for k in range(2):
-        for i in range(improved.shape[1]):
-            product += residual[k, i] * improved[k, i]
+    sums = _restrict_scaled(projector, arm, scale, improved)
+    return _balanced_product(projector, arm, _rigid(inverse_gram, sums), residual, improved)
+
+
+@compiled(fastmath=VECTOR)
+def _restrict_scaled(
+    projector: FloatArray, arm: FloatArray, scale: FloatArray, move: FloatArray
+) -> tuple[float, float, float]:
+    """Scale a move and restrict it to the space, in place; its resultants."""
+    sx = sy = sm = 0.0
+    for i in range(move.shape[1]):
+        mx, my = scale[i] * move[0, i], scale[i] * move[1, i]
+        px = projector[0, i] * mx + projector[1, i] * my
+        py = projector[1, i] * mx + projector[2, i] * my
+        move[0, i], move[1, i] = px, py
+        sx += px
+        sy += py
+        sm += arm[0, i] * py - arm[1, i] * px
+    return sx, sy, sm
+
+
+@compiled(fastmath=VECTOR)
+def _balanced_product(
+    projector: FloatArray, arm: FloatArray, motion: FloatArray, residual: FloatArray, move: FloatArray
+) -> float:
+    """Subtract a rigid motion from a move, in place; its product with the residual."""
+    mx, my, yaw, product = motion[0], motion[1], motion[2], 0.0
+    for i in range(move.shape[1]):
+        dx, dy = mx - arm[1, i] * yaw, my + arm[0, i] * yaw
+        px = move[0, i] - projector[0, i] * dx - projector[1, i] * dy
+        py = move[1, i] - projector[1, i] * dx - projector[2, i] * dy
+        move[0, i], move[1, i] = px, py
+        product += residual[0, i] * px + residual[1, i] * py
     return product
 
 

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.contact.defaults import TANGENTIAL, TINY
-from slipcore.contact.elasticity.fields import doubled, halved, inner, lengths, resultants, rigid_displacement
+from slipcore.contact.elasticity.fields import VECTOR, doubled, halved, lengths, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.limit_surface import limit_load
@@ -122,9 +123,9 @@ class _TangentialStep:
         displacement = self.operator.tangential(traction)
         residual = np.inf
         for iteration in range(max_iterations):
-            gradient = displacement + self.offset
-            nearest, _ = self.project(traction - self.stiffness * gradient, keep=True)
-            before, residual = residual, float(np.abs(traction - nearest).max()) / self.largest
+            gradient, point = _descend(traction, displacement, self.offset, self.stiffness)
+            nearest, _ = self.project(point, keep=True)
+            before, residual = residual, _largest_change(traction, nearest) / self.largest
             if iteration == 0 and residual > TANGENTIAL.far_start and min(self.limit.shape) >= 2 * TANGENTIAL.coarsest:
                 traction, _ = self.project(self._from_coarse(traction))
                 displacement = self.operator.tangential(traction)
@@ -132,7 +133,7 @@ class _TangentialStep:
             if residual <= tolerance:
                 result = self._result(traction, displacement, residual, iteration)
                 return self._at_the_limit(result) if result.sliding and self.given.all() else result
-            slip = gradient - rigid_displacement(self.arm, self.dual / self.stiffness)
+            slip = _against(gradient, self.arm, self.dual / self.stiffness)
             trial = nearest if residual > TANGENTIAL.slow * before and iteration % 2 else self._newton(traction, slip)
             traction, displacement = self._search(traction, displacement, slip, trial)
         raise NotConverged("tangential contact", residual, tolerance, max_iterations)
@@ -184,9 +185,8 @@ class _TangentialStep:
         """
         way = trial - traction
         response = self.operator.tangential(way)
-        slope, curvature = inner(slip, way), inner(way, response)
-        rounding = TANGENTIAL.slope_rounding * inner(lengths(slip), self.limit)
-        best = -slope / curvature if curvature > 0.0 and abs(slope) > rounding else 1.0
+        slope, curvature, work = _slopes(slip, way, response, self.limit)
+        best = -slope / curvature if curvature > 0.0 and abs(slope) > TANGENTIAL.slope_rounding * work else 1.0
         share = 1.0 if best >= 0.5 else max(best, 0.0)
         if share == 1.0:
             return trial, displacement + response
@@ -231,6 +231,56 @@ class _TangentialStep:
         lag = ((displacement + self.offset) * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=TINY)
         self.dual = direction * float(lag[self.limit > 0.0].max()) * self.stiffness
         return self._result(traction, displacement, 0.0, 0)._replace(sliding=True)
+
+
+@compiled
+def _descend(
+    traction: FloatArray, displacement: FloatArray, offset: FloatArray, stiffness: float
+) -> tuple[FloatArray, FloatArray]:
+    """The gradient, and the point that a step of length ``stiffness`` against it leads to."""
+    gradient, point = np.empty_like(traction), np.empty_like(traction)
+    q, u, c = traction.reshape(-1), displacement.reshape(-1), offset.reshape(-1)
+    g, w = gradient.reshape(-1), point.reshape(-1)
+    for i in range(q.size):
+        slope = u[i] + c[i]
+        g[i], w[i] = slope, q[i] - stiffness * slope
+    return gradient, point
+
+
+@compiled(fastmath=VECTOR | {"nnan"})
+def _largest_change(before: FloatArray, after: FloatArray) -> float:
+    """Largest difference of two fields."""
+    largest, a, b = 0.0, before.reshape(-1), after.reshape(-1)
+    for i in range(a.size):
+        size = abs(b[i] - a[i])
+        largest = size if size > largest else largest
+    return largest
+
+
+@compiled
+def _against(gradient: FloatArray, arm: FloatArray, motion: FloatArray) -> FloatArray:
+    """A gradient [2, ny, nx] less a rigid motion [3]."""
+    slip, mx, my, yaw = np.empty_like(gradient), motion[0], motion[1], motion[2]
+    g, a, s = gradient.reshape(2, -1), arm.reshape(2, -1), slip.reshape(2, -1)
+    for i in range(g.shape[1]):
+        s[0, i], s[1, i] = g[0, i] - (mx - yaw * a[1, i]), g[1, i] - (my + yaw * a[0, i])
+    return slip
+
+
+@compiled(fastmath=VECTOR)
+def _slopes(slip: FloatArray, way: FloatArray, response: FloatArray, limit: FloatArray) -> tuple[float, float, float]:
+    """Slope and curvature of the objective along a ``way`` [2, ny, nx], and the work of the slip's size at the limits.
+
+    ``response``: the way's displacement.
+    """
+    slope = curvature = work = 0.0
+    s, w, c, radius = slip.reshape(2, -1), way.reshape(2, -1), response.reshape(2, -1), limit.reshape(-1)
+    for i in range(radius.size):
+        sx, sy, wx, wy = s[0, i], s[1, i], w[0, i], w[1, i]
+        slope += sx * wx + sy * wy
+        curvature += wx * c[0, i] + wy * c[1, i]
+        work += np.sqrt(sx * sx + sy * sy) * radius[i]
+    return slope, curvature, work
 
 
 def _frictionless(offset: FloatArray, control: SolverControl) -> TangentialContact:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from slipcore.contact.elasticity.fields import rigid_displacement
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
+from slipcore.contact.solver import tangential as compiled
 from slipcore.contact.solver.tangential import SolverControl, solve_tangential
 
 FRICTION, FORCE = 0.4, 10.0
@@ -129,3 +131,17 @@ def test_applications_stay_few(sphere) -> None:
         case = sphere(cells)
         once(case, (2.8, 0.0, 0.0))
         assert case.operators.count.tangential <= 80  # on all grids together
+
+
+def test_fused_loops_of_a_newton_round_are_what_numpy_makes_of_them() -> None:
+    traction, displacement, offset, arm = np.random.default_rng(0).normal(size=(4, 2, 9, 11))
+    gradient, point = compiled._descend(traction, displacement, offset, 0.7)
+    np.testing.assert_array_equal(gradient, displacement + offset)
+    np.testing.assert_allclose(point, traction - 0.7 * gradient, rtol=0.0, atol=1e-15)
+    assert compiled._largest_change(traction, point) == pytest.approx(np.abs(traction - point).max(), rel=1e-15)
+    motion = np.array([0.3, -0.2, 0.7])
+    slip = compiled._against(gradient, arm, motion)
+    np.testing.assert_allclose(slip, gradient - rigid_displacement(arm, motion), rtol=0.0, atol=1e-15)
+    limit, way, response = np.abs(arm[0]), point, offset
+    expected = ((slip * way).sum(), (way * response).sum(), (np.hypot(*slip) * limit).sum())
+    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit), expected, rtol=1e-13)
