@@ -224,3 +224,12 @@ def _grasp_at(velocity: float, truth: np.ndarray, rng: np.random.Generator, shar
     v, f_n = np.full(40, velocity), rng.uniform(0.02, 0.2, 40)
     mu = truth @ np.stack([np.ones(40), v, f_n]) + 0.03 * rng.standard_normal(40) + shared * rng.standard_normal()
     return FrictionSamples(mu, v, f_n, mu * f_n, np.arange(40.0), np.arange(40) % 7, np.ones(40), 1e-6)
+
+
+def test_errors_from_moments_of_grasps_are_those_from_their_samples(samples: Make) -> None:
+    grasps = [samples(40 + 10 * k, seed=k) for k in range(5)]
+    whole = estimators.fit(grasps)
+    of_moments = estimators.fit([estimators.Moments.from_samples(grasp) for grasp in grasps])
+    np.testing.assert_allclose(of_moments.covariance, whole.covariance, rtol=1e-6)
+    for name in ("cluster", "classical"):
+        np.testing.assert_allclose(standard_errors(of_moments, name), standard_errors(whole, name), rtol=1e-6)

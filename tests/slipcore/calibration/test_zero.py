@@ -86,3 +86,17 @@ def test_drift_between_free_frames_is_told_with_its_error() -> None:
     found = drifts(zero)
     np.testing.assert_allclose([each[0] for each in found], DRIFT, rtol=1e-9)  # rounding
     assert [each[1] for each in found] == list(zero.drift_error)
+
+
+def test_frames_free_within_a_press_are_not_after_it() -> None:
+    """Touched in frames 3, 4 and 6 to the end."""
+    free = np.ones(len(LOAD), bool)
+    free[[3, 4]] = free[6:] = False
+    zero = find_zero(straight(added=faulty()), free)
+    assert zero is not None
+    assert not zero.around
+    assert zero.frames == 4
+    assert find_zero(straight(added=faulty()), np.arange(len(LOAD)) < 1) is None
+    two = find_zero(straight(added=faulty()), np.arange(len(LOAD)) < 2)
+    assert two is not None
+    assert two.frames == 2

@@ -214,3 +214,15 @@ def test_fields_of_an_independent_solution_of_the_paper_s_first_condition(step: 
     normal = contact.normal_displacement(np.hypot(x, y))
     np.testing.assert_allclose(normal, expected[..., 2], atol=1e-3 * np.abs(expected[..., 2]).max())
     assert case.stick_ratio == pytest.approx(stick_ratio, abs=0.01)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.9])
+def test_slip_at_the_edge_is_what_its_gradient_adds_up_to(ratio: float) -> None:
+    """In the mean over directions, along and across the load, in which what depends on them cancels."""
+    case = sheared(ratio, poisson_ratio=0.45)
+    edge = case.contact.contact_radius * (1.0 - 1e-9)
+    r = np.linspace(0.0, edge, 20_001)
+    along, across = (case.slip(x, y)[0] for x, y in ((np.array(edge), np.array(0.0)), (np.array(0.0), np.array(edge))))
+    assert np.trapezoid(case.slip_gradient(r), r) == pytest.approx(-0.5 * float(along + across), rel=1e-4)
+    assert np.isnan(case.slip_gradient(1.001 * edge))
+    assert case.slip_gradient(0.5 * case.stick_radius) == 0.0
