@@ -6,8 +6,10 @@ from inspect import unwrap
 import numpy as np
 import pytest
 
-from slipcore.detection.filter.loading import Loading, low_pass, step_loading
+from slipcore.defaults import FilterOptions
+from slipcore.detection.filter.loading import Loading, low_pass, restick_by_depth, restick_by_force, step_loading
 from slipcore.detection.filter.pose import AnchorMotion
+from slipcore.detection.filter.tuning import Tuning, settings_of
 
 INTERVAL, GAIN, STEPS = 0.02, 0.25, 3
 X, Y = 4e-3 * np.array([1.0, -1.0, -1.0, 1.0]), 3e-3 * np.array([1.0, 1.0, -1.0, -1.0])
@@ -44,3 +46,37 @@ def test_a_step_is_low_passed_as_an_exponential_of_time_whatever_the_frame_rate(
 
 def test_without_a_time_constant_the_newest_value_stands_alone() -> None:
     assert low_pass(0.1, 0.0) == 1.0
+
+
+TUNING = Tuning(*settings_of(FilterOptions()))._replace(
+    pressing_force_floor=0.5, pressing_force_deviations=4.0, pressing_floor=1e-6, pressing_deviations=3.0,
+    pressing_slope=2.0, stiffness_ratio=0.5,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("normal", "sideways", "resticks"), [(3.9, 0.0, False), (4.1, 0.0, True), (4.1, 1.2, True), (4.1, 1.3, False)]
+)
+@pytest.mark.parametrize("along", ["force_x", "force_y", "twist"])
+def test_all_sticks_under_a_force_that_grows_beyond_noise_and_faster_than_sideways(
+    along: str, normal: float, sideways: float, resticks: bool
+) -> None:
+    """Noise of √3/10 N in 0.1 s is √3 N/s, of which a low-pass of 0.5 leaves √3 · √(1/3) · 0.5 = 0.5 N/s, beside a
+    floor of as much; four of these; a slope of 0.3.
+    """
+    loading = Loading(0.0, 0.0, normal, 0.0, 0.0, 0.0)._replace(**{along: sideways})
+    assert unwrap(restick_by_force)(loading, 0.1 * math.sqrt(3.0), 0.1, 0.5, 0.3, TUNING) == resticks
+
+
+@pytest.mark.parametrize(
+    ("depth", "motion", "resticks"),
+    [(5.9e-6, 0.0, False), (6.1e-6, 0.0, True), (6.1e-6, 24e-6, True), (6.1e-6, 25e-6, False)],
+)
+def test_all_sticks_under_an_indentation_that_grows_beyond_noise_and_faster_than_the_object_moves(
+    depth: float, motion: float, resticks: bool
+) -> None:
+    """Of two elements to 0.2 µm each, in 0.1 s through a low-pass of 0.5: 1 µm/s, and 1 µm/s; three of these; half of
+    the motion against twice the depth.
+    """
+    loading = Loading(depth, motion, 0.0, 0.0, 0.0, 0.0)
+    assert unwrap(restick_by_depth)(loading, 2, (0.2e-6) ** 2, 0.1, 0.5, TUNING) == resticks

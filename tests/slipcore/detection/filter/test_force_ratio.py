@@ -1,0 +1,115 @@
+"""What force ratios say, by hand and against scipy, as plain Python."""
+
+from inspect import unwrap
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from slipcore.defaults import FilterOptions
+from slipcore.detection.filter.force_ratio import (
+    follow_forces,
+    keep_ratios,
+    learn_ratios,
+    log_normal_cdf,
+    ratio_log_odds,
+)
+from slipcore.detection.filter.state import (
+    COMMON,
+    FRICTION,
+    NORMAL,
+    PROBABILITY,
+    RATIO,
+    RATIO_WEIGHT,
+    ROWS,
+    TANGENTIAL,
+)
+from slipcore.detection.filter.tuning import Tuning, settings_of
+from slipcore.detection.shared.records import Surface
+
+PLACES = np.array([[0, 0], [0, 1], [1, 0]])
+TUNING = Tuning(*settings_of(FilterOptions()))._replace(
+    ratio_slip=0.8,
+    ratio_slip_of_element=0.9,
+    ratio_variance=0.01,
+    ratio_variance_of_element=0.04,
+    ratio_difference=0.5,
+    ratio_spread=0.1,
+)
+
+
+@pytest.mark.parametrize("z", [-40.0, -8.1, -7.9, -2.0, 0.0, 2.9, 3.1, 7.0])
+def test_the_logarithm_of_the_normal_distribution_is_right_on_all_branches(z: float) -> None:
+    assert unwrap(log_normal_cdf)(z) == pytest.approx(stats.norm.logcdf(z), rel=5e-4 if z < -8.0 else 2e-3)
+
+
+def test_a_ratio_tells_of_slip_by_the_ratio_of_two_densities() -> None:
+    """In slip normal about the limit; in stick uniform up to it and as blurred. Of an element that was never seen to
+    slip the limit is that of all, as wide as elements differ.
+    """
+    friction, noise, gain = 0.4, 1e-4, 0.02
+    deviation = np.sqrt(noise + (0.1 * friction) ** 2 + 0.25 * (0.5 * friction) ** 2)
+    for ratio in (0.1, 0.3, 0.39):
+        slip = stats.norm(friction, deviation).pdf(ratio)
+        stick = stats.norm.cdf((friction - ratio) / deviation) / friction
+        found = unwrap(ratio_log_odds)(ratio, noise, 0.0, 0.0, friction, gain, TUNING)
+        assert found == pytest.approx(np.log(slip / stick), rel=1e-3)
+    at, above = (unwrap(ratio_log_odds)(each, noise, 0.0, 0.0, friction, gain, TUNING) for each in (0.4, 0.7))
+    assert above == pytest.approx(at, rel=1e-9)
+
+
+def test_the_ratio_at_which_an_element_slips_moves_its_limit_from_that_of_all() -> None:
+    """Known as well as beforehand, 0.6 and 0.4 make 0.5, with half of the variance."""
+    gain = 0.02
+    prior = 2.0 * gain / 0.2**2
+    found = unwrap(ratio_log_odds)(0.45, 0.0, 0.6 * prior, prior, 0.4, gain, TUNING)
+    deviation = np.sqrt(0.04**2 + 0.25 * 0.2**2 / 2.0)
+    slip, stick = stats.norm(0.5, deviation).pdf(0.45), stats.norm.cdf(0.05 / deviation) / 0.5
+    assert found == pytest.approx(np.log(slip / stick), rel=1e-3)
+
+
+def elements(**rows: float) -> np.ndarray:
+    """State of 2 × 2 elements."""
+    made = np.zeros((ROWS, 2, 2))
+    for name, value in rows.items():
+        made[globals()[name]] = value
+    return made
+
+
+def test_forces_are_low_passed_where_contact_stays_and_begin_anew_elsewhere() -> None:
+    """Of 1 and 3 N before, and 2 and 5 N now; what pulls presses by nothing."""
+    old, new = elements(NORMAL=1.0, TANGENTIAL=3.0), elements(NORMAL=9.0, RATIO=7.0, RATIO_WEIGHT=7.0)
+    pressing, stays = np.full((2, 2), 2.0), np.array([[True, False], [True, True]])
+    pressing[1, 0] = -4.0
+    old[NORMAL, 1, 1] = 0.0  # no force before
+    surface = Surface(np.zeros((2, 2, 3)), pressing, np.full((2, 2), 5.0), stays, np.zeros(4))
+    unwrap(follow_forces)(old, surface, True, 0.25, new)
+    np.testing.assert_allclose(new[NORMAL], [[1.25, 2.0], [0.75, 2.0]])
+    np.testing.assert_allclose(new[TANGENTIAL], [[3.5, 5.0], [3.5, 5.0]])
+    assert not new[RATIO].any()
+    assert not new[RATIO_WEIGHT].any()
+    unwrap(follow_forces)(old, surface, False, 0.25, new)
+    assert not new[[NORMAL, TANGENTIAL]].any()
+
+
+def test_while_nothing_happens_ratios_stay() -> None:
+    old, new, told = elements(RATIO=0.3, RATIO_WEIGHT=2.0), elements(), np.ones((2, 3))
+    unwrap(keep_ratios)(old, PLACES, new, told)
+    assert not told.any()
+    assert new[RATIO].tolist() == [[0.3, 0.3], [0.3, 0.0]]
+    assert new[RATIO_WEIGHT].tolist() == [[2.0, 2.0], [2.0, 0.0]]
+
+
+def test_ratios_are_learnt_from_what_likely_slips_under_enough_force() -> None:
+    """Probabilities of 0.95, 0.85 and 0.95, of which the last bears too little; ratios of 0.5, 0.3 and 0.9."""
+    old, new, common = elements(RATIO=1.0, RATIO_WEIGHT=2.0), elements(), np.zeros(COMMON)
+    old[PROBABILITY] = [[0.95, 0.85], [0.95, 0.0]]
+    new[NORMAL], new[TANGENTIAL] = [[1.0, 1.0], [0.1, 0.0]], [[0.5, 0.3], [0.09, 0.0]]
+    common[FRICTION : FRICTION + 2] = 10.0, 20.0
+    unwrap(learn_ratios)(old, PLACES, np.full(3, 0.01), 0.1, 0.25, TUNING, new, common)
+    of_all = np.array([0.95**2, 0.85**2]) / 0.02
+    assert common[FRICTION] == pytest.approx(0.75 * 10.0 + 0.25 * of_all @ [0.5, 0.3])
+    assert common[FRICTION + 1] == pytest.approx(0.75 * 20.0 + 0.25 * of_all.sum())
+    own = 0.25 / 0.05
+    np.testing.assert_allclose(new[RATIO], [[0.75 + 0.5 * own, 0.75], [0.75, 0.0]])
+    np.testing.assert_allclose(new[RATIO_WEIGHT], [[1.5 + own, 1.5], [1.5, 0.0]])
