@@ -1,5 +1,6 @@
 """Noise between a given pose and the markers, of a camera that shakes or of who gives the pose, is no slip."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from inspect import unwrap
@@ -11,7 +12,8 @@ from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.detector import init, step
 from slipcore.detection.filter import pose_noise, surface_motion
-from slipcore.detection.filter.state import COMMON
+from slipcore.detection.filter.pose import PoseVariance, pose_at
+from slipcore.detection.filter.state import COMMON, CORRECTION
 from slipcore.detection.filter.tuning import Tuning, settings_of
 
 Score = Callable[[GraspLog, SlipHistory], float]
@@ -75,3 +77,41 @@ def test_the_deviation_of_white_noise_is_found_in_each_coordinate() -> None:
     rng, common, sizes = np.random.default_rng(5), np.zeros(COMMON), np.array([2e-6, 2e-6, 7e-4])
     found = np.array([noise(sizes * rng.standard_normal(3), common)[:2] for _ in range(3000)])
     np.testing.assert_allclose(found[100:].mean(axis=0), sizes[1:], rtol=0.05)  # 3000 frames, 31 at a time: 2 %
+
+
+@pytest.mark.parametrize(
+    ("of_noise", "of_fit", "of_slip", "share"),
+    [(4.0, 1.0, 1.0, 0.75), (1.0, 1.0, 1.0, 0.0), (math.inf, 1.0, 9.0, 1.0), (2.0, 0.0, 1.0, 1.0)],
+)
+def test_the_markers_count_by_the_noise_that_is_beyond_slip(
+    of_noise: float, of_fit: float, of_slip: float, share: float
+) -> None:
+    assert unwrap(pose_noise._share)(of_noise, of_fit, of_slip) == share
+
+
+TUNING = Tuning(*settings_of(FilterOptions()))._replace(pose_noise_least=2.0, following_variance=0.5)
+
+
+def test_noise_counts_beyond_what_may_be_the_fits_own() -> None:
+    assert unwrap(pose_noise.own_variance)(3.0, 2.0, TUNING) == 5.0
+    assert unwrap(pose_noise.own_variance)(1.0, 2.0, TUNING) == 0.0
+
+
+def test_an_offset_is_that_where_the_fit_is_known_best() -> None:
+    """A fit turned by a right angle about (1, 0), which a known pose at the origin leaves where it was."""
+    fitted, known = pose_at(1.0, 1.0, 0.5 * math.pi, 1.0), pose_at(0.0, 0.0, 0.0, 1.0)
+    offset = unwrap(pose_noise._offset)(known, fitted, PoseVariance(0.0, 0.0, 1.0, 0.0))
+    np.testing.assert_allclose(offset, [1.0 + 1.0, 0.0 - 0.0, 0.5 * math.pi], atol=1e-15)
+
+
+def test_a_known_pose_is_moved_by_the_share_of_its_noise_and_the_move_is_kept() -> None:
+    """Noise of 3 and of 0.4 rad, of which twice the fit's variance is its own."""
+    common, step = np.zeros(COMMON), np.zeros(3)
+    known, fitted = pose_at(0.0, 0.0, 0.2, 1.0), pose_at(0.8, -1.6, 0.6, 1.0)
+    spread, noise = PoseVariance(1.0, 0.04, 0.8, -1.6), pose_noise.PoseNoise(3.0, 0.4, True)
+    moved, left = unwrap(pose_noise.without_noise)(known, step, fitted, spread, noise, TUNING, common)
+    place, yaw = 7.0 / 8.0, 0.08 / (0.08 + 0.04)  # 9 − 2 over that and 1; 0.16 − 0.08 over that and 0.04
+    np.testing.assert_allclose(moved, [place * 0.8, -place * 1.6, 0.2 + yaw * 0.4], rtol=1e-12)
+    np.testing.assert_allclose(common[CORRECTION : CORRECTION + 3], moved - [0.0, 0.0, 0.2], rtol=1e-12)
+    assert np.count_nonzero(common) == 3
+    assert left == pytest.approx((place, yaw * 0.04, 0.8, -1.6))
