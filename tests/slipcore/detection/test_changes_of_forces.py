@@ -114,6 +114,15 @@ def test_no_lag_is_taken_that_leaves_three_tenths_unexplained() -> None:
         assert lag_of_forces(changes(moved, pushed)) == pytest.approx(found, abs=1e-12)
 
 
+@pytest.mark.parametrize(("alike", "found"), [(0.85, 0.2), (0.93, 0.0)])
+def test_no_lag_is_taken_of_several_that_leave_a_tenth_more_at_most(alike: float, found: float) -> None:
+    """A load that comes again after eight steps, most of it alike: lags of −0.6 and 1 s leave the rest."""
+    moved = jumps(count=4000)
+    for k in range(8, 4000):
+        moved[k] = np.sqrt(alike) * moved[k - 8] + np.sqrt(1.0 - alike) * moved[k]
+    assert lag_of_forces(changes(moved, np.roll(moved, 2, axis=0))) == pytest.approx(found, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("before", "left", "clear"),
     [(0.9, 0.44, True), (0.9, 0.46, False), (0.08, 0.035, False), (0.08, 0.025, True), (0.06, 0.02, False)],

@@ -1,13 +1,14 @@
 """Forces of one frame, and how well they are known."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
-from slipcore.forces.inverse.fit import TractionFit, TractionPrior, fit
+from slipcore.forces.inverse.fit import ObservationModel, TractionFit, TractionPrior, fit
 from slipcore.forces.inverse.prior import usual
 from slipcore.forces.operator.gel import Gel
-from slipcore.forces.tracking.frame_forces import Reader
+from slipcore.forces.tracking.frame_forces import FrameForces, Reader, _touching
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
@@ -40,3 +41,34 @@ def test_contacts_that_are_as_probable_widen_what_is_said_by_how_much_forces_dif
     )
     added = by_both.deviation**2 - by_one.deviation**2
     np.testing.assert_allclose(added.reshape(-1, 3), 0.3 * elements**2, rtol=1e-6, atol=1e-12)
+
+
+def test_an_element_touches_whose_force_is_beyond_noise_and_not_little_beside_others() -> None:
+    """Of a largest of 1: 0.06 is the least far from it, 0.15 beside it, and twice the deviation anywhere."""
+    normal = np.array([[1.0, 0.16, 0.0], [0.14, 0.0, 0.0], [0.0, 0.05, 0.07]])
+    deviation = np.full((3, 3), 0.03)
+    touching = _touching(normal, deviation)
+    assert np.argwhere(touching).tolist() == [[0, 0], [0, 1], [2, 2]]
+    deviation[2, 2], deviation[0, 1] = 0.036, 0.079
+    assert np.argwhere(_touching(normal, deviation)).tolist() == [[0, 0], [0, 1]]
+
+
+def test_of_a_frame_that_shows_nothing_the_known_force_is_taken_by_its_share_of_the_variance() -> None:
+    """Up to 3 N would not be noticed; 10 N to 4 N are known along z, and nothing along x and y."""
+    known = KnownForce(np.array([np.nan, np.nan, 10.0]), np.full(3, 4.0))
+    found = FrameForces.unnoticed((2, 1), np.array([1.0, 2.0, 3.0]), known)
+    np.testing.assert_allclose(found.resultant, [0.0, 0.0, -10.0 * 9.0 / 25.0])
+    np.testing.assert_allclose(found.resultant_deviation, [1.0, 2.0, 3.0 * 4.0 / 5.0])
+    np.testing.assert_array_equal(found.deviation, [[[1.0, 2.0, 3.0]]] * 2)
+    assert not found.force.any()
+    assert not found.contact.any()
+
+
+def test_a_fit_holds_while_data_move_by_little_more_than_the_noise_of_both() -> None:
+    """A tenth of (60, 80) over the noise is 10; of two data twice their noise adds 4: 10² + 4."""
+    observation = ObservationModel(np.zeros((3, 3, 1)), np.array([2.0, 2.0, np.inf]))
+    key = Key(observation, np.array([120.0, 160.0, 0.0]), cast("TractionFit", None))
+    for change, holds in ((2.0 * np.sqrt(103.9), True), (2.0 * np.sqrt(104.1), False)):
+        assert key.holds(observation, np.add(key.data, [change, 0.0, 0.0])) == holds
+    assert not key.holds(ObservationModel(np.zeros((3, 3, 1)), np.array([2.0, np.inf, np.inf])), key.data)
+    assert not key.holds(observation, key.data[:2])
