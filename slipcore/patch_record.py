@@ -39,8 +39,8 @@ class Patch:
     ``pose`` [k, 3]: where it lies among the markers at rest, x m, y m and yaw rad of its longer axis; ``speed`` m/s:
     mean speed of the object over the markers; ``regime``: one of ``REGIMES``; ``normal_force`` N,
     ``tangential_force`` [k, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
-    bears these; ``element_force`` N: mean normal force of its elements, weighted by force. Without forces all of
-    these are NaN.
+    bears these, and the standard deviation ``ratio_noise`` that noise of the forces gives it; ``element_force`` N: mean
+    normal force of its elements, weighted by force. Without forces all of these are NaN.
     """
 
     first: int
@@ -52,6 +52,7 @@ class Patch:
     moment: FloatArray
     load_ratio: FloatArray
     element_force: FloatArray
+    ratio_noise: FloatArray
     plateau: NDArray[np.bool_]
 
     @property

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from slipcore.defaults import PatchOptions, choose_options
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.noise import estimate_noise
 from slipcore.patch.motion import motion_over_markers
 from slipcore.patch.plateau import find_plateaus
 from slipcore.patch.pose import lattice_pose
@@ -54,6 +55,13 @@ def _resultants(log: GraspLog, spans: Spans, options: PatchOptions) -> Resultant
     """NaN without forces."""
     if log.force is None:
         frames = len(spans.frame)
-        return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(3)))
+        return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(4)))
     wide = spans._replace(labels=widened(spans.labels, options.margin))
-    return resultants(log.force, normals_of(log), log.position + log.displacement, wide, options.kernel_width)
+    place, noise = log.position + log.displacement, _force_noise(log.time, log.force)
+    return resultants(log.force, normals_of(log), place, wide, options.kernel_width, noise)
+
+
+def _force_noise(time: FloatArray, force: FloatArray) -> float:
+    """Standard deviation of a component of the force [t, n, m, 3] N on an element; 0 where too few frames show it."""
+    noise = estimate_noise(time, np.moveaxis(force, -1, 1).reshape(len(time), 3, -1))
+    return float(np.nan_to_num(noise))

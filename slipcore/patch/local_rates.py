@@ -23,14 +23,15 @@ def local_rates(time: FloatArray, values: FloatArray, bounds: IntArray, window: 
     return slope, error
 
 
-def moving_mean(time: FloatArray, values: FloatArray, bounds: IntArray, window: float) -> FloatArray:
-    """Mean [k] of ``values`` [k] over ``window`` s about each frame; NaN are left out, and stay where all are.
+def moving_mean(time: FloatArray, values: FloatArray, bounds: IntArray, window: float) -> tuple[FloatArray, FloatArray]:
+    """Mean [k] of ``values`` [k] over ``window`` s about each frame, and of how many, [k]; NaN are left out, and stay
+    where all are.
 
     Of several patches, as ``local_rates``.
     """
-    mean = np.full(len(time), np.nan)
-    _fill_means(for_kernels(time), for_kernels(values), bounds, window, mean)
-    return mean
+    mean, count = np.full(len(time), np.nan), np.zeros(len(time))
+    _fill_means(for_kernels(time), for_kernels(values), bounds, window, mean, count)
+    return mean, count
 
 
 @compiled
@@ -52,16 +53,19 @@ def _fill_lines(time: FloatArray, series: FloatArray, window: float, slope: Floa
 
 
 @compiled
-def _fill_means(time: FloatArray, values: FloatArray, bounds: IntArray, window: float, mean: FloatArray) -> None:
+def _fill_means(
+    time: FloatArray, values: FloatArray, bounds: IntArray, window: float, mean: FloatArray, count: FloatArray
+) -> None:
     for p in range(len(bounds) - 1):
         span = slice(bounds[p], bounds[p + 1])
-        _fill_mean(time[span], values[span], window, mean[span])
+        _fill_mean(time[span], values[span], window, mean[span], count[span])
 
 
 @compiled
-def _fill_mean(time: FloatArray, series: FloatArray, window: float, mean: FloatArray) -> None:
+def _fill_mean(time: FloatArray, series: FloatArray, window: float, mean: FloatArray, count: FloatArray) -> None:
     sums, middle = _sums_in_windows(time, series, window)
     for e in range(len(series)):
+        count[e] = sums[e, 0]
         if sums[e, 0] > 0.0:
             mean[e] = middle[e] + sums[e, 2] / sums[e, 0]
 

@@ -13,7 +13,7 @@ from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 CLOSE_ENOUGH = Descent(PATCHES.descents, PATCHES.settled, PATCHES.still, PATCHES.rank, PATCHES.free_motion)
 """To 0.1 %."""
-_LEAST_SQUARE_ARM = PATCHES.least_square_arm
+_LEAST_SQUARE_ARM, _SIGNIFICANT = PATCHES.least_square_arm, PATCHES.significant
 
 
 class Resultants(NamedTuple):
@@ -21,8 +21,9 @@ class Resultants(NamedTuple):
 
     ``normal_force`` N along the patch's mean normal; ``tangential_force`` [k, 2] N across it, the first component
     nearest to x; ``moment`` N·m about it at the centre of pressure; ``load_ratio``: the least friction coefficient that
-    bears force and moment, which is that of the patch once all of it slips; ``element_force`` Σ f_n²/Σ f_n N: mean
-    normal force of an element, weighted by force.
+    bears force and moment, which is that of the patch once all of it slips, and the standard deviation
+    ``ratio_noise`` that noise of the forces gives it; ``element_force`` Σ f_n²/Σ f_n N: mean normal force of an
+    element, weighted by force.
     """
 
     normal_force: FloatArray
@@ -30,6 +31,7 @@ class Resultants(NamedTuple):
     moment: FloatArray
     load_ratio: FloatArray
     element_force: FloatArray
+    ratio_noise: FloatArray
 
 
 def resultants(
@@ -38,41 +40,53 @@ def resultants(
     place: FloatArray,
     spans: Spans,
     kernel_width: float = 0.0,
+    force_noise: float = 0.0,
 ) -> Resultants:
     """Of the force [t, n, m, 3] N on the elements of patches, at ``place`` [t, n, m, 3] m, with outward unit normals
     [t, n, m, 3].
 
     Sums are of signed forces, so that noise around the patch adds nothing to them on average. Forces that a sensor
     smooths over ``kernel_width`` m (standard deviation) reach further out than those that act: their mean square arm is
-    larger by twice the square of it, while F_n, F_T and M stay.
+    larger by twice the square of it, while F_n, F_T and M stay. ``force_noise`` N of each component on an element.
     """
     fields = for_kernels(force), for_kernels(normal), for_kernels(place)
-    sums = np.empty((len(spans.frame), 6))
-    _fill_sums(*fields, spans, kernel_width, sums)
+    sums = np.empty((len(spans.frame), 7))
+    _fill_sums(*fields, spans, kernel_width, force_noise, sums)
     return Resultants(sums[:, 0], sums[:, 1:3], *sums[:, 3:].T)
 
 
 @compiled
 def _fill_sums(
-    force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, kernel_width: float, sums: FloatArray
+    force: FloatArray,
+    normal: FloatArray,
+    place: FloatArray,
+    spans: Spans,
+    kernel_width: float,
+    force_noise: float,
+    sums: FloatArray,
 ) -> None:
-    """Of all frames of the patches, [k, 6]."""
+    """Of all frames of the patches, [k, 7]."""
     for e, k in enumerate(spans.frame):
         patch = elements_at(spans, e)
-        sums[e] = _of_frame(force[k], normal[k], place[k], patch, kernel_width)
+        sums[e] = _of_frame(force[k], normal[k], place[k], patch, kernel_width, force_noise)
 
 
 @compiled
 def _of_frame(
-    force: FloatArray, normal: FloatArray, place: FloatArray, patch: IntArray, kernel_width: float
-) -> tuple[float, float, float, float, float, float]:
+    force: FloatArray,
+    normal: FloatArray,
+    place: FloatArray,
+    patch: IntArray,
+    kernel_width: float,
+    force_noise: float,
+) -> tuple[float, float, float, float, float, float, float]:
     """Of one frame, in the order of ``Resultants``."""
     axes = _axes(_mean_normal(force, normal, patch))
     f, r = _in_axes(force, patch, axes), _in_axes(place, patch, axes)
     pressing, arm = -f[2], r[:2]
     total, sideways_x, sideways_y = pressing.sum(), f[0].sum(), f[1].sum()
     if not total > 0.0:
-        return 0.0, math.nan, math.nan, math.nan, math.nan, math.nan
+        return 0.0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
     for axis in range(2):
         arm[axis] -= (pressing * arm[axis]).sum() / total
     moment = (arm[0] * f[1] - arm[1] * f[0]).sum()
@@ -80,9 +94,47 @@ def _of_frame(
     if mean_square > 0.0:
         arm *= math.sqrt(max(1.0 - 2.0 * kernel_width**2 / mean_square, _LEAST_SQUARE_ARM))
     load = np.array([sideways_x, sideways_y, moment])
-    factor = find_limit_load(pressing, arm, load, np.ones(3, np.bool_), CLOSE_ENOUGH).factor
-    ratio = 1.0 / factor if factor > 0.0 else math.hypot(sideways_x, sideways_y) / total
-    return total, sideways_x, sideways_y, moment, ratio, (pressing * pressing).sum() / total
+    ratio, noise = _load_ratio(pressing, arm, load, force_noise)
+    return total, sideways_x, sideways_y, moment, ratio, (pressing * pressing).sum() / total, noise
+
+
+@compiled
+def _load_ratio(pressing: FloatArray, arm: FloatArray, load: FloatArray, force_noise: float) -> tuple[float, float]:
+    """The least friction coefficient that bears a load (F_x, F_y, M), and its standard deviation.
+
+    In any motion friction has to take up at least what the load does, so that each gives a ratio of both; the largest
+    is the answer. A patch of few elements hardly resists a rotation, in which noise of elements around it seems to do
+    much: only where the ratio of both is surer than that of the translation along the force is it taken.
+    """
+    motion = find_limit_load(pressing, arm, load, np.ones(3, np.bool_), CLOSE_ENOUGH).motion
+    along = np.array([load[0], load[1], 0.0])
+    (ratio, noise), (shifted, its_noise) = (
+        _ratio_in(motion, pressing, arm, load, force_noise),
+        _ratio_in(along, pressing, arm, load, force_noise),
+    )
+    if ratio - _SIGNIFICANT * noise >= shifted - _SIGNIFICANT * its_noise:
+        return ratio, noise
+    return shifted, its_noise
+
+
+@compiled
+def _ratio_in(
+    motion: FloatArray, pressing: FloatArray, arm: FloatArray, load: FloatArray, force_noise: float
+) -> tuple[float, float]:
+    """What a load does in a motion over what friction of coefficient 1 takes up, and the standard deviation of that.
+
+    Both have the noise σ √Σ|B_i d|², of forces across and along the normal. Where friction takes up nothing beyond
+    noise the ratio is at least 0, and that is sure.
+    """
+    done, taken, square = (motion * load).sum(), 0.0, 0.0
+    for i in range(pressing.size):
+        x, y = motion[0] - arm[1, i] * motion[2], motion[1] + arm[0, i] * motion[2]
+        taken += pressing[i] * math.hypot(x, y)
+        square += x * x + y * y
+    noise = force_noise * math.sqrt(square)
+    if not taken > _SIGNIFICANT * noise:
+        return 0.0, 0.0
+    return done / taken, math.hypot(1.0, done / taken) * noise / taken
 
 
 @compiled

@@ -53,8 +53,44 @@ def test_a_contact_that_holds_gives_a_bound_below_its_friction(turns: bool) -> N
     still = ramp_and_go(0.0, turns=turns)
     found = friction_of(grasp(still._replace(share=0.6 * still.share), FRICTION, Setting(**NOISE)))
     assert found.is_bound
-    assert found.low == pytest.approx(0.6 * FRICTION, rel=0.1)
+    assert found.low == pytest.approx(0.6 * FRICTION, rel=0.12), "6 % by sums, and noise"
     assert (found.low < FRICTION, found.high) == (True, np.inf)
+
+
+ONE_ELEMENT = np.zeros((5, 5), bool)
+ONE_ELEMENT[2, 2] = True
+
+
+def held_by(elements: np.ndarray, share: float, noise: float, seed: int, seconds: float = 2.0) -> ContactFriction:
+    """A load of ``share`` of 0.8 N held by these elements [5, 5] of 3 mm, under noise of all forces, N."""
+    time = np.arange(round(30 * seconds)) / 30.0
+    axis = 3e-3 * np.arange(-2.0, 3.0)
+    position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((5, 5))], axis=-1)
+    force = np.zeros((len(time), 5, 5, 3))
+    force[:, elements] = 0.8 / elements.sum() * np.array([share, 0.0, -1.0])
+    force += noise * np.random.default_rng(seed).standard_normal(force.shape)
+    log = GraspLog(time, position, np.zeros_like(force), 9e-6, force, np.broadcast_to([0.0, 0.0, 1.0], force.shape))
+    touching = np.broadcast_to(elements, force.shape[:3])
+    found = contact_friction(time, follow_patches(log, touching, np.zeros_like(touching)))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3, 5e-3])
+def test_noise_around_a_contact_of_one_element_is_no_moment_on_it(noise: float) -> None:
+    found = held_by(ONE_ELEMENT, 0.35, noise, seed=1)
+    assert found.coefficient == pytest.approx(0.35, abs=0.01 + 5.0 * noise)
+    assert 0.9 * 0.35 - 25.0 * noise < found.low < 0.35
+
+
+@pytest.mark.parametrize("seconds", [2.0, 30.0])
+@pytest.mark.parametrize("elements", [ONE_ELEMENT, np.ones((5, 5), bool)])
+def test_a_bound_lies_above_what_was_held_as_seldom_as_it_says(elements: np.ndarray, seconds: float) -> None:
+    """Less the 3 % that resultants err by, which nothing here does: without noise subtracted 20 to 200 would."""
+    bare = 1.0 - 1.96 * 0.03
+    lows = [held_by(elements, 0.35, 5e-3, seed, seconds).low / bare for seed in range(200)]
+    assert sum(low > 0.35 for low in lows) <= 10, "2.5 % of 200, and three standard deviations of chance"
+    assert np.median(lows) > 0.25
 
 
 def test_a_contact_that_travels_under_hardly_any_load_rolls() -> None:
