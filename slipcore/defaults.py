@@ -717,8 +717,8 @@ class CheckOptions(Options):
     """From elements that touch, up to which others may feel something of the contact."""
     least_free: Annotated[int, Option(2, 1000000, "elements", "a mean to half of their scatter")] = 4
     """Elements beyond that from which they tell the sensor's zero during a grasp."""
-    normal_lean: Annotated[float, Option(0.0, 1.0, "-", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
-    """Sine of the largest angle between the mean normal and that of the surface."""
+    normal_lean: Annotated[float, Option(0.0, 1.0, "rad", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
+    """Largest angle by which all normals lean against the surface."""
     gripper_share: Annotated[float, Option(0.0, 10.0, "-", "resultants of Tac3D part from their sum by 3 to 7 %")] = (
         0.15
     )

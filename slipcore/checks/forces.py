@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from slipcore.checks.rest import frames_at_rest, touched_elements
 from slipcore.checks.subject import Subject
-from slipcore.errors import InvalidInput
 from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.surface.log_normals import normals_of_shape
 
 ComplexArray = NDArray[np.complex128]
 
@@ -118,22 +116,41 @@ def leaning_normals(seen: Subject) -> Iterator[Finding]:
     idle = np.flatnonzero(~seen.history.contact.any(axis=(1, 2)))
     frames = idle if len(idle) > 1 else np.arange(len(log))
     chosen = np.unique(frames[np.linspace(0, len(frames) - 1, seen.limits.stretch_frames).astype(int)])
-    try:
-        own = normals_of_shape(log.position, log.displacement[chosen])
-    except InvalidInput:  # no lattice, of which no shape follows
-        return
-    given, surface = (_direction(each) for each in (log.normal[chosen], own))
-    lean = float(np.linalg.norm(np.cross(given, surface), axis=-1).min())
-    if lean > seen.limits.normal_lean:
-        degrees = np.degrees(np.arcsin(min(lean, 1.0)))
+    lean, rest = min(_lean_of_frame(log.normal[k], log.position, log.displacement[k]) for k in chosen)
+    if lean > max(seen.limits.normal_lean, rest):
+        degrees = np.degrees(lean)
         evidence = f"normals lean by {degrees:.1f}° against the surface that the elements lie on, in every frame"
         yield Finding("leaning normals", evidence, "give normals in the sensor's frame, or none")
 
 
-def _direction(normal: FloatArray) -> FloatArray:
-    """Of the mean of normals [t, n, m, 3] over the elements, [t, 3]."""
-    mean = normal.mean(axis=(1, 2))
-    return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), np.finfo(float).tiny))
+def _lean_of_frame(normal: FloatArray, position: FloatArray, displacement: FloatArray) -> tuple[float, float]:
+    """``_lean`` against the surface at rest, or as it is pressed: that to which the normals belong, leaving less."""
+    return min((_lean(normal, place) for place in (position, position + displacement)), key=lambda each: each[1])
+
+
+def _lean(normal: FloatArray, place: FloatArray) -> tuple[float, float]:
+    """Angle in rad by which normals [n, m, 3] lean alike against the surface through ``place`` [n, m, 3] m, and the
+    standard deviation of what is left of them; (0, 0) where the places show no surface.
+
+    The line to a neighbour is square to the mean of both normals, exactly so on a sphere, a cylinder and a plane,
+    however few elements there are. Of places that are flat under the normals of a dome much is left.
+    """
+    upward = _unit(normal.mean(axis=(0, 1)))
+    turns, gaps = list[FloatArray](), list[FloatArray]()
+    for axis in (0, 1):
+        line = _unit(np.diff(place, axis=axis))
+        middle = 0.5 * (np.delete(normal, 0, axis) + np.delete(normal, -1, axis))
+        turns.append(np.cross(middle, line).reshape(-1, 3))
+        gaps.append(-np.vecdot(middle, line).ravel())
+    turn, gap = np.concatenate(turns), np.concatenate(gaps)
+    across = turn - np.outer(turn @ upward, upward)  # turned about themselves normals lean nowhere
+    found = np.linalg.lstsq(across, gap, rcond=None)[0]
+    return float(np.linalg.norm(found)), float((gap - across @ found).std())
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    """Vectors [..., 3] over their lengths; 0 stays."""
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), np.finfo(float).tiny))
 
 
 def _alike(read: FloatArray, readings: FloatArray) -> float:

@@ -282,6 +282,40 @@ def test_normals_of_the_deformed_shape_lean_nowhere(long_ramp: GraspLog) -> None
     assert "leaning normals" not in names(shaped.take(slice(30, None)))
 
 
+def on_a_fingertip(log: GraspLog, elements: int, radius: float = 8e-3) -> GraspLog:
+    """The log's middle on a cylinder of 14 mm that ends in a cap: normals and rest places in closed form."""
+    begin = (log.grid[0] - elements) // 2
+    cut = slice(begin, begin + elements)
+    along, around = np.meshgrid(np.linspace(-7e-3, 7e-3, elements), np.linspace(-0.7, 0.7, elements), indexing="ij")
+    tilt = np.clip(along, 0.0, None) / radius
+    normal = np.stack([np.sin(tilt), np.cos(tilt) * np.sin(around), np.cos(tilt) * np.cos(around)], axis=-1)
+    position = radius * normal + np.minimum(along, 0.0)[..., None] * np.array([1.0, 0.0, 0.0])
+    displacement, force = (np.asarray(each)[:, cut, cut] for each in (log.displacement, log.force))
+    return replace(
+        log,
+        position=position,
+        displacement=displacement,
+        force=force,
+        normal=np.broadcast_to(normal, force.shape),
+        element_area=1e-5,
+        truth=None,
+        contact=None,
+    )
+
+
+@pytest.mark.parametrize("elements", [3, 4, 5, 6, 10])
+def test_normals_of_a_coarse_fingertip_lean_only_where_they_are_turned(long_ramp: GraspLog, elements: int) -> None:
+    """A surface by differences of places had been off by up to 5° on these."""
+    tip = on_a_fingertip(long_ramp, elements)
+    assert "leaning normals" not in names(tip)
+    assert "leaning normals" in names(with_leaning_normals(tip, 4.0))
+
+
+def test_normals_of_a_dome_whose_places_are_given_flat_say_nothing_of_a_lean(long_ramp: GraspLog) -> None:
+    tip = on_a_fingertip(long_ramp, 5)
+    assert "leaning normals" not in names(replace(tip, position=tip.position * np.array([1.0, 1.0, 0.0])))
+
+
 def test_a_gripper_that_reports_late_and_a_contact_beside_the_elements_contradict_nothing(long_ramp: GraspLog) -> None:
     log = gripped(long_ramp)
     assert log.gripper_force is not None
