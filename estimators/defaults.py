@@ -458,7 +458,7 @@ class AlarmSettings(Options):
     """Within which a change should be noticed."""
     settled: Annotated[int, Option(2, 1000, "grasps", "with fewer, it is their number that hides a change")] = 10
     """From which grasps that differ too much for that are noted."""
-    fall_digits: Annotated[float, Option(1e-6, 0.1, "-", "in whole per cent it is told")] = 5e-3
+    fall_digits: Annotated[float, Option(1e-6, 0.1, "-", "it is given in whole per cent")] = 5e-3
     """To which the least fall that would be noticed is found."""
     longest: Annotated[int, Option(10, 1_000_000, "grasps", "a change so long ago is the material")] = 1000
     """That are looked at: those before say no more of τ."""

@@ -15,6 +15,7 @@ import slipcore.calibration.defaults
 import slipcore.contact.defaults
 import slipcore.defaults
 import slipcore.forces.defaults
+from benchmarks.defaults import rows
 from slipcore import METHODS, CheckOptions, SampleOptions
 from slipcore.options import Options, describe_options
 
@@ -76,6 +77,12 @@ def test_every_default_has_a_unit_a_source_and_a_value_in_its_range(kind: type[O
         assert option.source
         assert option.low < option.high
         assert entry.name == "force_noise" or option.low <= entry.default <= option.high
+
+
+def test_the_page_has_every_default_as_it_is() -> None:
+    page = (ROOT / "docs/defaults.md").read_text(encoding="utf-8")
+    told = {tuple(line[2:-2].split(" | ", 6)) for line in page.splitlines() if line.count("|") > 7 and "`" in line}
+    assert told == set(rows()), "renew it: python -m benchmarks.defaults --page docs/defaults.md"
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -166,15 +166,20 @@ def table_of(found: list[Row]) -> str:
     return "\n".join(lines) + (f"\n\nLess than {DEAD:g} by either: {', '.join(quiet)}." if quiet else "")
 
 
-def every() -> dict[Key, tuple[float, str]]:
-    """Value and unit of each default: of every table, every method, what callers may choose, and grip control."""
-    found: dict[Key, tuple[float, str]] = {}
+def tables_of_options() -> dict[str, type[Options]]:
+    """Those of every method, of what callers may choose, and of every table, by the names that pages call them by."""
     kinds: dict[str, type[Options]] = {method: described.options for method, described in METHODS.items()}
     kinds |= {kind.__name__: kind for kind in (CheckOptions, PatchOptions, SampleOptions)}
     for module in MODULES:
         tables = [(label, table) for label, table in vars(module).items() if label.isupper()]
         kinds |= {qualified(module, label): type(table) for label, table in tables if isinstance(table, Options)}
-    for label, kind in kinds.items():
+    return kinds
+
+
+def every() -> dict[Key, tuple[float, str]]:
+    """Value and unit of each default: of every table, every method, what callers may choose, and grip control."""
+    found: dict[Key, tuple[float, str]] = {}
+    for label, kind in tables_of_options().items():
         units = describe_options(kind)
         found |= {(label, entry.name): (entry.default, units[entry.name].unit) for entry in fields(kind)}
     given = {entry.name: entry.default for entry in fields(ControlSettings) if entry.default is not MISSING}

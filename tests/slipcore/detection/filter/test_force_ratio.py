@@ -1,5 +1,6 @@
 """What force ratios say, by hand and against scipy, as plain Python."""
 
+import math
 from inspect import unwrap
 
 import numpy as np
@@ -13,6 +14,7 @@ from slipcore.detection.filter.force_ratio import (
     learn_ratios,
     log_normal_cdf,
     ratio_log_odds,
+    weigh_forces,
 )
 from slipcore.detection.filter.state import (
     COMMON,
@@ -113,3 +115,29 @@ def test_ratios_are_learnt_from_what_likely_slips_under_enough_force() -> None:
     own = 0.25 / 0.05
     np.testing.assert_allclose(new[RATIO], [[0.75 + 0.5 * own, 0.75], [0.75, 0.0]])
     np.testing.assert_allclose(new[RATIO_WEIGHT], [[1.5 + own, 1.5], [1.5, 0.0]])
+
+
+def test_ratios_count_above_so_many_deviations_of_a_low_passed_force() -> None:
+    """Ten of 0.3 N, of which a low-pass that keeps one half per step leaves √(1/3): 1.73 N. In a second a third of what
+    is known is replaced, and the log-odds of an element count by the newest half.
+    """
+    tuning = TUNING._replace(
+        force_smoothing=1.0 / math.log(2.0), ratio_memory=1.0 / math.log(1.5), force_to_noise=10.0,
+        ratio_least_force=0.1, ratio_limit=6.0, ratio_weight=0.8,
+    )  # fmt: skip
+    for normal, counts in ((1.72, False), (1.75, True)):
+        old, new, common, told = elements(), elements(), np.zeros(COMMON), np.full((2, 3), 9.0)
+        new[NORMAL, 0, 0], new[TANGENTIAL, 0, 0] = normal, 0.5 * normal
+        common[FRICTION : FRICTION + 2] = 40.0, 100.0
+        unwrap(weigh_forces)(old, PLACES, 0.3, 1.0, tuning, new, common, told)
+        variance = 0.09 / 3.0 * 1.25 / normal**2
+        assert told[1].tolist() == [pytest.approx(variance) if counts else 0.0, 0.0, 0.0]
+        expected = unwrap(ratio_log_odds)(0.5, variance, 0.0, 0.0, 0.4, 1.0 / 3.0, tuning)
+        assert told[0, 0] == (pytest.approx(0.8 * 0.5 * expected) if counts else 0.0)
+        np.testing.assert_allclose(common[FRICTION : FRICTION + 2], [80.0 / 3.0, 200.0 / 3.0])
+
+
+def test_without_a_known_friction_ratios_say_nothing() -> None:
+    new, told = elements(NORMAL=1.0, TANGENTIAL=0.5), np.full((2, 3), 9.0)
+    unwrap(weigh_forces)(elements(), PLACES, 0.01, 1.0, TUNING, new, np.zeros(COMMON), told)
+    assert not told[0].any()
