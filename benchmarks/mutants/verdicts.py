@@ -16,7 +16,7 @@ from benchmarks.mutants.reach import Reach
 from benchmarks.mutants.scratch_copy import ScratchCopy
 
 BUDGET = 30.0
-"""Seconds of tests that one mutant is tried with, as long as they took before; what is tried in place ends then."""
+"""Seconds of tests that one mutant is tried with: as long as they took before, or as they compute, in place."""
 
 PATIENCE = 6.0
 """How many times as long a test may take, before a mutant counts as one that never ends; without what it compiles."""
@@ -121,7 +121,7 @@ class Court:
         reached = self._tests_of(edit)
         spent, unsteady = 0.0, set[str]()
         while True:
-            tests = self._chosen(edit, reached - unsteady, usual=USUAL if importing else 0.0)
+            tests = self._chosen(edit, reached - unsteady, self._budget if importing else math.inf)
             told = self._ask(edit, tests, importing=importing, is_quick=is_quick)
             spent += told["seconds"]
             if not importing and told["needs_import"]:
@@ -148,10 +148,9 @@ class Court:
         tests = self._names or self._copy.collected()
         return {test for test in tests if _file(test) in files and not self._calls(test, STARTS_ANEW)}
 
-    def _chosen(self, edit: Edit, tests: set[str], usual: float) -> list[str]:
-        """Tests as far as time allows: first those that name what is changed or something of its module, then others of
-        the files nearby, then the package's in quick files; what starts servers at last. Those that were never timed
-        count as ``usual`` s: nothing where a trial ends by itself once its time is used.
+    def _chosen(self, edit: Edit, tests: set[str], budget: float) -> list[str]:
+        """Tests of ``budget`` s in all, as long as they took before: first those that name what is changed or something
+        of its module, then others of the files nearby, then the package's in quick files; what starts servers at last.
         """
         cost: dict[str, float] = defaultdict(float)
         for test in tests:
@@ -174,8 +173,8 @@ class Court:
 
         chosen, spent = [], 0.0
         for test in sorted(tests, key=rank):
-            spent += self._durations.get(test, usual)
-            if chosen and spent > self._budget:
+            spent += self._durations.get(test, USUAL)
+            if chosen and spent > budget:
                 continue
             chosen.append(test)
         return chosen

@@ -324,12 +324,15 @@ def test_a_change_made_in_place_is_noticed_as_one_that_is_imported(
     assert not court_in_place.try_mutant(edit.undone()).is_killed
 
 
-def test_only_where_a_trial_does_not_end_by_itself_tests_are_left_out_by_a_guess(copy: ScratchCopy) -> None:
-    names = {f"tests/slipcore/test_program.py::{name}" for name in ("test_a", "test_b", "test_c")}
-    with closing(Court(copy, ["slipcore/program.py"], libraries="", budget=1.5 * verdicts.USUAL)) as court:
-        edit = change(copy, ">", ">=")
-        assert set(court._chosen(edit, names, usual=0.0)) == names
-        assert len(court._chosen(edit, names, usual=verdicts.USUAL)) == 1
+def test_in_place_all_tests_are_tried_until_their_time_is_used(copy: ScratchCopy) -> None:
+    copy.data.unlink()
+    tests = [f"tests/slipcore/test_program.py::{name}" for name in ("test_is_large", "test_total", "test_flaky")]
+    copy.durations.write_text(json.dumps(dict.fromkeys(tests, 3600.0)))  # on a machine that was busy
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", least=2.0, in_place=True)) as court:
+        verdict = court.try_in_place(change(copy, ">", ">="))
+        assert verdict is not None
+        assert (verdict.by, verdict.tests, verdict.left_out) == ("", 3, 1)  # the one that fails without a change
+        assert len(court._chosen(change(copy, ">", ">="), set(tests), verdicts.BUDGET)) == 1
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
