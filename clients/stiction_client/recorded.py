@@ -1,7 +1,7 @@
 """Numbers as a service or a file gives them: numbers, and such as a fit can have."""
 
 import math
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def number(name: str, value: object, *, least: float = -math.inf, above: float =
     """A number of at least ``least`` and above ``above``; raises ``ValueError`` naming another thing."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ValueError(f"{name}, which is {value!r:.40}, no number")
-    if not abs(cast(float, value)) <= LARGEST:
+    if not abs(value if isinstance(value, int) else float(value)) <= LARGEST:
         raise ValueError(f"{name}, which is {value!r:.40}; allowed: finite, of a size up to {LARGEST:g}")
     found = float(value)
     if not (found >= least and found > above):
