@@ -1,0 +1,63 @@
+"""What the stick ratio alone says of friction."""
+
+import math
+
+import pytest
+
+from stiction_client import ControlSettings, Observation
+from stiction_client.contacts import Contact
+from stiction_client.controller.friction import utilisation
+from stiction_client.controller.stick_ratio import StickRatioEstimate
+
+SETTINGS = ControlSettings(contact=Contact.flat(1e-4), least_force=0.5, most_force=30.0)
+NOTHING = StickRatioEstimate()
+
+
+def step(known: StickRatioEstimate, ratio: float, size: float = 1.0, normal: float = 4.0) -> StickRatioEstimate:
+    return known.step(Observation(3.0, normal, size, stick_ratio=ratio), size, SETTINGS)
+
+
+def test_friction_is_the_load_over_what_the_sticking_part_leaves() -> None:
+    found = step(NOTHING, 0.25)
+    assert found.friction == pytest.approx(1.0 / (4.0 * (1.0 - 0.25**1.5)))
+    assert (found.told, found.stick_ratio, found.slipping) == (3.0, 0.25, 0)
+    assert found.required(2.0, 0.25) == pytest.approx(8.0)
+    assert found.required(1.0, 0.0) == pytest.approx(1.0 / found.friction)
+    assert (utilisation(0.0), utilisation(1.0)) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize(("size", "normal"), [(0.0, 4.0), (1.0, 0.0)])
+def test_what_bears_nothing_shows_no_friction_and_leaves_what_was_found(size: float, normal: float) -> None:
+    known = step(NOTHING, 0.25)
+    assert step(known, 0.25, size, normal).friction == known.friction
+    assert math.isnan(step(NOTHING, 0.25, size, normal).friction)
+
+
+def test_a_contact_that_sticks_as_a_whole_shows_none_either() -> None:
+    told = SETTINGS.told_stick_ratio
+    assert math.isnan(step(NOTHING, told).friction)
+    assert step(NOTHING, math.nextafter(told, 0.0)).friction > 0.0
+
+
+def test_without_a_ratio_the_time_of_the_last_one_stands_and_no_slip_is_counted() -> None:
+    known = step(NOTHING, 0.0)
+    lost = known.step(Observation(9.0, 4.0, 1.0), 1.0, SETTINGS)
+    assert (lost.told, lost.friction, lost.slipping) == (3.0, known.friction, 0)
+    assert math.isnan(lost.stick_ratio)
+
+
+def test_slip_is_that_of_frames_in_a_row_up_to_the_reflex_ratio() -> None:
+    known = NOTHING
+    for count in range(SETTINGS.reflex_frames):
+        assert not known.slips(SETTINGS)
+        known = step(known, SETTINGS.reflex_stick_ratio)
+        assert known.slipping == count + 1
+    assert known.slips(SETTINGS)
+    assert step(known, math.nextafter(SETTINGS.reflex_stick_ratio, 1.0)).slipping == 0
+
+
+def test_nothing_is_required_of_what_bears_nothing_or_was_never_felt() -> None:
+    assert NOTHING.required(1.0, 0.5) == 0.0
+    assert step(NOTHING, 0.25).required(0.0, 0.5) == 0.0
+    assert StickRatioEstimate(0.0, 0.5, 0.0).required(1.0, 0.5) == math.inf
+    assert StickRatioEstimate(0.0, 0.5, 0.0).required(0.0, 0.5) == 0.0
