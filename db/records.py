@@ -309,8 +309,7 @@ class SamplesOfLog:
     """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
 
     ``findings``: names of what was found against the log, None where it was not looked for; ``sensor``: its name;
-    ``copies``: ids of later logs of the
-    same grasp, which do not count.
+    ``copies``: ids of other logs of the same grasp, which do not count.
     """
 
     grasp_log_id: str

@@ -1,23 +1,24 @@
 """Queries on what was found in a log: detection and samples, stored together."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, fields
-from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Select, delete, select, update
+from sqlalchemy import ColumnElement, Row, Select, delete, func, select, update
 from sqlalchemy.orm import Session
 
 from db.records import ContactFriction, Detection, Finding, Gel, SampledLog, SamplesOfLog, SampleSummary, Signature
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow, SensorRow
 
-EVER = datetime(1970, 1, 1, tzinfo=UTC)
+_NEWEST_FIRST = (GraspLogRow.number.desc(), GraspLogRow.id.desc())
 
 
 def add(
     session: Session, log_id: str, detection: Detection, samples: SampleSummary, signature: bytes | None = None
 ) -> None:
-    """Store what was found in a log, with that by which its grasp is known again in a cut or rounded log."""
+    """Store what was found in a log, with that by which its grasp is known again in a cut or rounded log: nothing
+    where nothing touched, None where it was not looked for.
+    """
     velocity, force = samples.tangential_velocity or (None, None), samples.normal_force or (None, None)
     session.add(DetectionRow(grasp_log_id=log_id, **asdict(detection), signature=signature))
     session.add(
@@ -49,7 +50,8 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     """The samples of a material, one entry a grasp, oldest first.
 
     Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
-    still: the samples of the one that was sent last count. Of logs of one grasp the one counts that was sent first.
+    still: the samples of the one that was sent last count. Of logs of one grasp the one with the most samples counts,
+    the earliest of several.
     """
     found = session.execute(_samples(material_id).order_by(GraspLogRow.number, GraspLogRow.id)).all()
     copies = _copies(found)
@@ -74,18 +76,30 @@ def others_of_grasp(session: Session, log_id: str, fingerprint: str) -> list[str
     return list(session.scalars(ordered))
 
 
-def signatures(session: Session, log_id: str, most: int, since: datetime = EVER) -> Iterator[Signature]:
-    """Those of other logs of its material, withdrawn ones too, newest first, ``most`` of them, one at a time, that
-    were stored ``since`` then.
+def has_signature(session: Session, log_id: str) -> bool:
+    """Whether that was looked for by which a log's grasp is known again."""
+    query = select(DetectionRow.grasp_log_id).where(DetectionRow.grasp_log_id == log_id)
+    return session.scalar(query.where(DetectionRow.signature.is_not(None))) is not None
+
+
+def known_again(session: Session, log_id: str, most: int) -> list[str]:
+    """Ids of the other logs of its material, withdrawn ones too, that have signatures: the newest ``most``, newest
+    first.
     """
     own = select(GraspLogRow.material_id, GraspLogRow.sha256).where(GraspLogRow.id == log_id)
     material_id, sha256 = session.execute(own).one()
     if material_id is None:
-        return
-    query = select(DetectionRow.fingerprint, DetectionRow.signature).join(GraspLogRow)
+        return []
+    query = select(GraspLogRow.id).join(DetectionRow)
     of_others = (GraspLogRow.material_id == material_id, GraspLogRow.sha256 != sha256)
-    with_one = query.where(*of_others, DetectionRow.signature.is_not(None), DetectionRow.created_at >= since)
-    ordered = with_one.order_by(GraspLogRow.number.desc(), GraspLogRow.id.desc()).limit(most)
+    ordered = query.where(*of_others, func.length(DetectionRow.signature) > 0).order_by(*_NEWEST_FIRST).limit(most)
+    return list(session.scalars(ordered))
+
+
+def signatures(session: Session, log_ids: Collection[str]) -> Iterator[Signature]:
+    """Those of these logs, newest first, one at a time."""
+    query = select(DetectionRow.fingerprint, DetectionRow.signature).join(GraspLogRow)
+    ordered = query.where(GraspLogRow.id.in_(log_ids)).order_by(*_NEWEST_FIRST)
     with session.execute(ordered.execution_options(yield_per=10)) as rows:  # which may be left before their end
         for row in rows:
             yield Signature(row.fingerprint or "", row.signature or b"")
@@ -94,7 +108,7 @@ def signatures(session: Session, log_id: str, most: int, since: datetime = EVER)
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
     """The same of its newest logs, newest first; of a log that went through several detectors, as it was sent last."""
     newest = _samples(material_id).add_columns(GraspLogRow.grid_rows, GraspLogRow.grid_columns)
-    newest = newest.order_by(GraspLogRow.number.desc(), GraspLogRow.id.desc()).limit(most)  # as an index has them
+    newest = newest.order_by(*_NEWEST_FIRST).limit(most)  # as an index has them
     rows = session.execute(newest).all()
     copied = {each for others in _copies(rows).values() for each in others}
     found: dict[str, SampledLog] = {}
@@ -106,12 +120,16 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
 
 
 def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
-    """Contents of the same grasp as another that was sent earlier, by the content of the first."""
-    contents: dict[str, dict[str, None]] = {}  # by fingerprint, in the order in which they were sent
+    """Contents of the same grasp as another that has more samples, or as many and was sent earlier; by the content of
+    that one.
+    """
+    counts: dict[str, dict[str, int]] = {}  # of each content, by fingerprint, in the order in which they were sent
     for row in sorted(rows, key=lambda row: (row.number, row.id)):
         if row.fingerprint is not None:
-            contents.setdefault(row.fingerprint, {})[row.sha256] = None
-    return {first: others for first, *others in contents.values() if others}
+            counts.setdefault(row.fingerprint, {})[row.sha256] = row.samples
+    most = [max(found, key=lambda content: found[content]) for found in counts.values()]
+    groups = zip(most, counts.values(), strict=True)
+    return {counted: [each for each in found if each != counted] for counted, found in groups if len(found) > 1}
 
 
 def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
@@ -119,6 +137,7 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
         select(
             GraspLogRow.sha256,
             GraspLogRow.id,
+            SampleSummaryRow.count.label("samples"),
             SampleSummaryRow.samples_blob,
             SampleSummaryRow.moments,
             DetectionRow.findings,

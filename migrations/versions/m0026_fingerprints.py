@@ -13,6 +13,8 @@ down_revision = "0025"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (("fingerprints of grasps", "SELECT count(*) FROM detections WHERE fingerprint IS NOT NULL"),)
+
 MARK = "unchecked_logs"
 LOGS = sa.table("grasp_logs", *(sa.column(name) for name in ("id", "material_id", "withdrawn_at")))
 SAMPLES = sa.table("sample_summaries", *(sa.column(name) for name in ("grasp_log_id", "count")))

@@ -8,6 +8,8 @@ down_revision = "0026"
 branch_labels = None
 depends_on = None
 
+LOST_ON_THE_WAY_BACK = (("signatures of grasps", "SELECT count(*) FROM detections WHERE signature IS NOT NULL"),)
+
 
 def upgrade() -> None:
     op.add_column("detections", sa.Column("signature", sa.LargeBinary(), nullable=True))

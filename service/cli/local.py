@@ -125,30 +125,24 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service.domain.doubtful_logs import with_doubts
-    from service.domain.same_grasp import fingerprint, is_alike, same_grasp, signature
+    from service.domain.same_grasp import Grasps, same_grasp
 
-    known = list[tuple[str, bytes]]()
-
-    def grasp_of(log: "GraspLog") -> str:
-        """The fingerprint of the first log of the same grasp."""
-        own, content = fingerprint(log), signature(log)
-        grasp = next((first for first, other in known if first == own or is_alike(content, other)), own)
-        known.append((grasp, content))
-        return grasp
+    grasps = Grasps()
 
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
         log = read_log(path, mapping)
         seen = look(log, detector, sensor_model, gel)
-        return grasp_of(log), seen.samples(), seen.findings()
+        return grasps.of(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
 
     first = dict[str, Path]()
-    seen: list[tuple[FrictionSamples, list[Finding]]] = []
+    copies: dict[str, list[tuple[FrictionSamples, list[Finding]]]] = {}
     looked_at = list(counted(map(found, logs), len(logs), "logs looked at"))
     for path, (grasp, samples, findings) in zip(logs, looked_at, strict=True):
         for finding in (*same_grasp([first[grasp].name] if grasp in first else []), *findings):
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
-        if first.setdefault(grasp, path) is path:
-            seen.append((samples, findings))
+        first.setdefault(grasp, path)
+        copies.setdefault(grasp, []).append((samples, findings))
+    seen = [max(of_grasp, key=lambda each: len(each[0])) for of_grasp in copies.values()]
     with shown_progress(f"fitting by {method}"):
         model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
     model = with_doubts(model, [[finding.name for finding in findings] for _, findings in seen])

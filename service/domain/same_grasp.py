@@ -1,16 +1,21 @@
 """One grasp that was sent in several files: how it is known again, and what is said of it."""
 
 import hashlib
+from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from db.records import Signature
 from stiction_client.support import SAME_GRASPS
 
 if TYPE_CHECKING:
-    from db.records import SamplesOfLog, Signature
+    from scipy.spatial import cKDTree
+
+    from db.records import SamplesOfLog
     from estimators import FrictionModel
     from slipcore import Finding, GraspLog
     from slipcore.frames import FloatArray
@@ -25,7 +30,12 @@ MOST_FRAMES = 20_000
 """Of a log, whose sums are kept: its first ones."""
 
 MOST_LOGS, MOST_COMPARED = 1000, 1_000_000
-"""Logs of a material, the newest, and frames of all of them, with which a new one is compared: a second at most."""
+"""Logs of a material, the newest, and frames of all of them, with which a new one is compared: .3 to .8 s of CPU time,
+measured.
+"""
+
+LOOKED_AT, LEAST_VALUES = 200, 1000
+"""Frames of a log, and different values of all its readings in these, from which on its sums tell it from others."""
 
 ASKED = 64
 """Frames of a log, among those with more than half of its usual largest load, that are looked for in another."""
@@ -67,9 +77,12 @@ def signature(log: "GraspLog") -> bytes:
     """By which the same measurements are known again in a log that was cut, rounded or scaled by a little.
 
     Sums of the readings of each frame, with signs that are drawn once for all: noise makes them differ from grasp to
-    grasp, and rounding changes them by far less than noise does. ``is_alike`` compares them.
+    grasp, and rounding changes them by far less than noise does. ``Sums`` compares them.
+    Nothing of readings that take too few values.
     """
     measured = log.displacement if log.force is None else log.force
+    if not _is_distinctive(measured):
+        return b""
     signs = _signs(measured[0].size)
     kept = min(len(measured), MOST_FRAMES)
     parts = (measured[begin : min(begin + FRAMES, kept)] for begin in range(0, kept, FRAMES))
@@ -77,29 +90,101 @@ def signature(log: "GraspLog") -> bytes:
     return (OF_DISPLACEMENT if log.force is None else OF_FORCE) + sums.astype("<f4").tobytes()
 
 
-def find_alike(own: bytes, others: "Iterable[Signature]") -> "Signature | None":
+def find_alike(own: bytes, others: Iterable[Signature]) -> Signature | None:
     """The first of the others that is of the same grasp, as far as they are compared."""
-    compared = 0
+    if not own:  # nothing touched
+        return None
+    mine, compared = Sums(own), 0
     for other in others:
-        compared += len(other.content) // (4 * SUMS)
+        theirs = Sums(other.content)
+        compared += len(theirs.frames)
         if compared > MOST_COMPARED:
             return None
-        if is_alike(own, other.content):
+        if mine.are_alike(theirs):
             return other
     return None
 
 
-def is_alike(one: bytes, other: bytes) -> bool:
-    """Whether these signatures are of one grasp: most frames under load of one of the logs are in the other, too."""
-    if one[:1] != other[:1]:
-        return False
-    sums = [np.frombuffer(each, "<f4", offset=1).reshape(-1, SUMS).astype(float) for each in (one, other)]
-    within = NOISE_SHARE * np.minimum(*map(_noise, sums))
-    within = np.maximum(within, DIGITS * min(_usual(np.abs(each).max(axis=1)) for each in sums))
-    if not within.all():
-        return False
-    frames, others = (each / within for each in sums)
-    return max(_shared(frames, others), _shared(others, frames)) >= SHARED
+class Grasps:
+    """Tells the grasps of logs apart, by comparing each with ``MOST_LOGS`` before it."""
+
+    def __init__(self) -> None:
+        self._of_copies: dict[str, str] = {}
+        self._newest_first: deque[Signature] = deque(maxlen=MOST_LOGS)
+
+    def of(self, log: "GraspLog", *, is_touched: bool) -> str:
+        """The fingerprint of the first log of the same grasp."""
+        own, content = fingerprint(log), signature(log) if is_touched else b""
+        if own in self._of_copies:
+            return self._of_copies[own]
+        alike = find_alike(content, self._newest_first)
+        grasp = alike.fingerprint if alike else own
+        self._of_copies[own] = grasp
+        if content:
+            self._newest_first.appendleft(Signature(grasp, content))
+        return grasp
+
+
+@dataclass(frozen=True)
+class Sums:
+    """A signature as it is compared with any number of others."""
+
+    signature: bytes
+
+    def are_alike(self, other: "Sums") -> bool:
+        """Whether they are of one grasp: most frames under load of one of the logs are in the other, too."""
+        if not self.signature or self.signature[:1] != other.signature[:1]:
+            return False
+        within = NOISE_SHARE * np.minimum(self._noise, other._noise)
+        within = np.maximum(within, DIGITS * min(self._size, other._size))
+        return bool(within.all()) and max(self._share_in(other, within), other._share_in(self, within)) >= SHARED
+
+    @cached_property
+    def frames(self) -> "FloatArray":
+        """The sums of each frame [t, SUMS]."""
+        return np.frombuffer(self.signature, "<f4", offset=1).reshape(-1, SUMS).astype(float)
+
+    @cached_property
+    def _size(self) -> float:
+        return _usual(np.abs(self.frames).max(axis=1))
+
+    @cached_property
+    def _noise(self) -> "FloatArray":
+        return _noise(self.frames)
+
+    @cached_property
+    def _widest(self) -> "FloatArray":
+        """How far a frame of another log may be off at most [SUMS]."""
+        return np.maximum(NOISE_SHARE * self._noise, DIGITS * self._size)
+
+    @cached_property
+    def _tree(self) -> "cKDTree":
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.frames / self._widest)
+
+    @cached_property
+    def _asked(self) -> "FloatArray":
+        """Frames under load that are looked for in other logs [k, SUMS]."""
+        load = np.linalg.norm(self.frames / self._widest, axis=1)
+        loaded = np.flatnonzero(load > 0.5 * _usual(load))
+        return np.asarray(self.frames[loaded[np.unique(np.linspace(0, len(loaded) - 1, ASKED).astype(int))]])
+
+    def _share_in(self, other: "Sums", within: "FloatArray") -> float:
+        """Share of its frames under load that are among the other's, which may be off by as much in each sum."""
+        found = other._tree.query_ball_point(self._asked / other._widest, 1.0, p=np.inf)
+        near: list[list[int]] = np.asarray(found, object).tolist()
+        asked = np.repeat(np.arange(len(near)), [len(frames) for frames in near])
+        off = np.abs(other.frames[np.concatenate(near).astype(int)] - self._asked[asked])
+        return len(np.unique(asked[(off <= within).all(axis=1)])) / len(near)
+
+
+def _is_distinctive(measured: "FloatArray") -> bool:
+    """Whether its readings [t, n, m, 3] tell its grasp from others: few elements in coarse steps take the same few
+    values in many grasps.
+    """
+    some = measured[np.unique(np.linspace(0, len(measured) - 1, LOOKED_AT).astype(int))]
+    return int(np.count_nonzero(np.diff(np.sort(some, axis=0), axis=0))) >= LEAST_VALUES
 
 
 def _signs(readings: int) -> "FloatArray":
@@ -120,19 +205,6 @@ def _noise(sums: "FloatArray") -> "FloatArray":
     return np.asarray(1.4826 * np.median(np.abs(np.diff(sums, 2, axis=0)), axis=0) / np.sqrt(6.0))
 
 
-def _shared(frames: "FloatArray", others: "FloatArray") -> float:
-    """Share of the frames under load [t, SUMS] that are among the others, where 1 is as far as they may be off."""
-    from scipy.spatial import cKDTree
-
-    load = np.linalg.norm(frames, axis=1)
-    loaded = np.flatnonzero(load > 0.5 * _usual(load))
-    if not loaded.size:
-        return 0.0
-    asked = frames[loaded[np.unique(np.linspace(0, len(loaded) - 1, ASKED).astype(int))]]
-    distance = cKDTree(others).query(asked, p=np.inf, distance_upper_bound=1.0)[0]
-    return float(np.isfinite(distance).mean())
-
-
 def same_grasp(others: Sequence[str]) -> "list[Finding]":
     """That a log is of the same grasp as ``others``, by their ids, where there are any."""
     from slipcore import Finding
@@ -140,8 +212,8 @@ def same_grasp(others: Sequence[str]) -> "list[Finding]":
     if not others:
         return []
     evidence = (
-        f"the measurements are those of log {others[0]}, whole, cut or rounded: of such logs of a material the first "
-        "alone counts"
+        f"the measurements are those of log {others[0]}, whole, cut or rounded: of such logs of a material the one "
+        "with the most samples alone counts"
     )
     return [Finding("same grasp", evidence, REMEDY)]
 
@@ -151,7 +223,7 @@ def with_copies(model: "FrictionModel", logs: "Sequence[SamplesOfLog]") -> "Fric
     pairs = [(copy, log.grasp_log_id) for log in logs for copy in log.copies]
     if not pairs:
         return model
-    named = [f"{copy} of {first}" for copy, first in pairs[:TOLD]]
+    named = [f"{copy} of {counted}" for copy, counted in pairs[:TOLD]]
     more = [f"{len(pairs) - TOLD} more"] if len(pairs) > TOLD else []
     count = "1 log repeats" if len(pairs) == 1 else f"{len(pairs)} logs repeat"
     told = f"{count} the measurements of another log: counted once ({', '.join([*named, *more])}); {REMEDY}"

@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,9 +144,14 @@ def summarise_history(
         releases=len(events.release),
         seconds=seconds,
         history_blob=blob,
-        findings=tuple(Finding(each.name, each.evidence, each.remedy) for each in findings),
+        findings=stored_findings(findings),
         contact_friction=None if contact is None else _stored_contact(contact),
     )
+
+
+def stored_findings(findings: Iterable[slipcore.Finding]) -> tuple[Finding, ...]:
+    """What is kept of findings."""
+    return tuple(Finding(each.name, each.evidence, each.remedy) for each in findings)
 
 
 def _stored_contact(contact: slipcore.ContactFriction) -> ContactFriction:

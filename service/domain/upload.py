@@ -247,7 +247,7 @@ def _change_sensor(
 def _can_go_on(session: Session, log: StoredGraspLog) -> bool:
     """Whether a job done again may take what it had found before it failed or was cancelled: it would find the same."""
     found = log.detection
-    can_be_same = found is not None and not _is_unchecked(found) and found.gel == _gel(session, log)
+    can_be_same = found is not None and not _is_unchecked(session, log.id, found) and found.gel == _gel(session, log)
     return log.job.status in {"failed", "cancelled"} and can_be_same
 
 
@@ -259,7 +259,7 @@ def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     job, found = log.job, log.detection
     if job.status in {"failed", "cancelled"}:
         return True
-    if found is not None and _is_unchecked(found):
+    if found is not None and _is_unchecked(session, log.id, found):
         return job.finished_at is not None
     findings = () if found is None else found.findings or ()
     by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
@@ -272,9 +272,9 @@ def _is_calibrated_anew(session: Session, log: StoredGraspLog) -> bool:
     return is_newer and log.job.finished_at is not None
 
 
-def _is_unchecked(found: Detection) -> bool:
+def _is_unchecked(session: Session, log_id: str, found: Detection) -> bool:
     """Whether an older version did not look for findings, or whether the grasp is another log's."""
-    return found.findings is None or found.fingerprint is None
+    return found.findings is None or not detections.has_signature(session, log_id)
 
 
 def _gel(session: Session, log: StoredGraspLog) -> Gel | None:

@@ -9,7 +9,6 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from datetime import UTC, datetime, timedelta
 from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,7 +19,7 @@ import estimators
 import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
-from db.records import Claim, Gel, Job, NewModel, SamplesOfLog, SampleSummary
+from db.records import Claim, Detection, Gel, Job, NewModel, SamplesOfLog, SampleSummary, Signature
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
@@ -37,6 +36,7 @@ from service.domain.stored_results import (
     decode_samples,
     encode_history,
     encode_samples,
+    stored_findings,
     summarise_history,
     summarise_samples,
     to_new_model,
@@ -51,12 +51,6 @@ if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
 
 logger = logging.getLogger(__name__)
-
-OVERLAP = timedelta(minutes=1)
-"""By which the clocks of two workers may differ that store logs of one grasp at once."""
-
-LATE_LOGS = 50
-"""At most, with which a log is compared once more while others wait to write."""
 
 FITS_BESIDE_OTHERS = 3
 """Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
@@ -159,18 +153,14 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         stored = grasp_logs.get(session, log_id)
     if stored.samples is not None:
         return stored.samples
-    began = datetime.now(UTC)
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
         if log.sensor != stored.sensor:  # it was named beside the file
             log = replace(log, sensor=stored.sensor)
-        mark, own = fingerprint(log), signature(log)
+        own = Signature(fingerprint(log), signature(log))
     with run.database.read() as session:
-        alike = find_alike(own, detections.signatures(session, log_id, MOST_LOGS))
-        mark = alike.fingerprint if alike else mark
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
         gel = sensors.get(session, stored.sensor).gel
-        others = detections.others_of_grasp(session, log_id, mark)
     log, reconstruction = _with_forces(run, correction.log, gel)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(
@@ -180,7 +170,6 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
         findings = [
-            *same_grasp(others),
             *correction_findings(correction, stored.uploaded_by),
             *reconstruction_findings(log, reconstruction),
             *findings,
@@ -190,16 +179,34 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
         detection = replace(detection, calibration=correction.version, corrections=correction.changed, gel=gel)
-        detection = replace(detection, fingerprint=mark)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
-    with run.database.write() as session:
-        materials_of_logs.hold(session, log_id)
-        jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
-        late = find_alike(own, detections.signatures(session, log_id, LATE_LOGS, since=began - OVERLAP))
-        detection = replace(detection, fingerprint=late.fingerprint) if late else detection
-        detections.add(session, log_id, detection, summary, own if history.contact.any() else None)
-        jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
+    _store_found(run, log_id, detection, summary, own if history.contact.any() else own._replace(content=b""))
     return summary
+
+
+def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSummary, own: Signature) -> None:
+    """Store what was found in a log as that of the grasp that it is of.
+
+    It is compared while others may write, and once more with what they stored of its material meanwhile.
+    """
+    compared, mark = set[str](), own.fingerprint
+    while True:
+        with run.timed("samples"), run.database.read() as session:
+            others = [each for each in detections.known_again(session, log_id, MOST_LOGS) if each not in compared]
+            alike = find_alike(own.content, detections.signatures(session, others))
+        compared.update(others)
+        mark = alike.fingerprint if alike else mark
+        with run.database.write() as session:
+            materials_of_logs.hold(session, log_id)
+            jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
+            if not compared.issuperset(detections.known_again(session, log_id, MOST_LOGS)):
+                continue
+            copied = same_grasp(detections.others_of_grasp(session, log_id, mark))
+            findings = (*stored_findings(copied), *(detection.findings or ()))
+            found = replace(detection, fingerprint=mark, findings=findings)
+            detections.add(session, log_id, found, summary, own.content)
+            jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
+            return
 
 
 def fit_material(run: Run) -> None:

@@ -143,6 +143,24 @@ def test_of_logs_of_one_grasp_the_first_that_is_not_withdrawn_counts(
     assert counted() == alone | {ids["b"]: ()}
 
 
+def test_of_logs_of_one_grasp_the_one_with_the_most_samples_counts(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    """A short cut that came first let the whole log be left out."""
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+    short, whole, again = (add(database, new_log(paper)) for _ in range(3))
+    with database.write() as session:
+        for log_id, count in ((short, 5), (whole, 500), (again, 500)):
+            found = replace(samples, count=count)
+            detections.add(session, log_id, replace(detection, fingerprint="1" * 64), found)
+    with database.read() as session:
+        (counted,) = detections.samples_of_material(session, paper)
+        (newest,) = detections.newest_sampled_logs(session, paper, 9)
+    assert (counted.grasp_log_id, counted.copies) == (whole, (short, again))
+    assert newest.samples.grasp_log_id == whole
+
+
 def test_logs_without_a_material_are_no_copies_of_each_other(
     database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
 ) -> None:
@@ -157,18 +175,20 @@ def test_signatures_of_the_other_logs_of_a_material_come_newest_first(
 ) -> None:
     with database.write() as session:
         paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
-    ids = [add(database, new_log(material)) for material in (paper, paper, steel, paper, paper)]
-    unassigned, began = add(database, new_log()), datetime.now(UTC)
+    ids = [add(database, new_log(material)) for material in (paper, paper, steel, paper, paper, paper)]
+    unassigned = add(database, new_log())
+    kept = {0: b"0", 1: None, 2: b"2", 3: b"", 4: b"4"}  # of the fourth nothing, as nothing touched it
     with database.write() as session:
-        for number, log_id in enumerate(ids[:-1]):
-            print_ = replace(detection, fingerprint=str(number) * 64)
-            detections.add(session, log_id, print_, samples, None if number == 1 else b"%d" % number)
-        found = list(detections.signatures(session, ids[-1], 9))
-        assert found == [Signature("3" * 64, b"3"), Signature("0" * 64, b"0")]
-        assert list(detections.signatures(session, ids[-1], 1)) == found[:1]
-        assert list(detections.signatures(session, ids[0], 9)) == found[:1]
-        assert list(detections.signatures(session, ids[-1], 9, since=began + timedelta(minutes=1))) == []
-        assert list(detections.signatures(session, unassigned, 9)) == []
+        for number, content in kept.items():
+            detections.add(session, ids[number], replace(detection, fingerprint=str(number) * 64), samples, content)
+        assert detections.known_again(session, ids[5], 9) == [ids[4], ids[0]]
+        assert detections.known_again(session, ids[5], 1) == [ids[4]]
+        assert detections.known_again(session, ids[0], 9) == [ids[4]]
+        assert detections.known_again(session, unassigned, 9) == []
+        found = list(detections.signatures(session, [ids[0], ids[4]]))
+        assert found == [Signature("4" * 64, b"4"), Signature("0" * 64, b"0")]
+        looked_for = [detections.has_signature(session, log_id) for log_id in ids]
+    assert looked_for == [True, False, True, True, True, False]
 
 
 def test_no_clock_that_is_set_moves_the_order_of_logs(

@@ -262,6 +262,15 @@ def test_fit_counts_a_grasp_once_that_comes_in_two_files(run: Run, ramps: list[P
     assert f"copy.npz: same grasp: the measurements are those of log {ramps[0].name}" in told
 
 
+def test_fit_counts_the_whole_log_where_a_cut_of_it_came_first(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    cut = tmp_path / "cut.npz"
+    container.write(formats.read(ramps[0]).take(slice(60)), cut)
+    _, alone, _ = run("fit", ramps[0], "--method", "ols", "--json")
+    _, out, told = run("fit", cut, ramps[0], "--method", "ols", "--json")
+    assert json.loads(out)["n"] == json.loads(alone)["n"]
+    assert f"{ramps[0].name}: same grasp: the measurements are those of log cut.npz" in told
+
+
 def test_fit_says_that_velocities_are_unknown(run: Run, ramps: list[Path], tmp_path: Path) -> None:
     path = tmp_path / "unposed.npz"
     container.write(replace(formats.read(ramps[-1]), object_pose=None), path)

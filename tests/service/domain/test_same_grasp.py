@@ -1,13 +1,15 @@
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import estimators
 from db.records import SamplesOfLog, Signature
 from service.domain import same_grasp
-from service.domain.same_grasp import find_alike, fingerprint, is_alike, signature, with_copies
+from service.domain.same_grasp import Grasps, Sums, find_alike, fingerprint, signature, with_copies
 from slipcore import GraspLog
 from slipcore.samples import FrictionSamples
 from stiction_client.support import notes
@@ -55,8 +57,8 @@ def noisy(ramp: GraspLog, seed: int, noise: float = 1e-3) -> GraspLog:
 
 
 def alike(one: GraspLog, other: GraspLog) -> bool:
-    found = is_alike(signature(one), signature(other))
-    assert is_alike(signature(other), signature(one)) == found
+    found = Sums(signature(one)).are_alike(Sums(signature(other)))
+    assert Sums(signature(other)).are_alike(Sums(signature(one))) == found
     return found
 
 
@@ -106,6 +108,57 @@ def test_no_more_frames_are_compared_than_a_second_allows(ramp: GraspLog, monkey
     assert find_alike(own, known) is None
 
 
+def coarse(ramp: GraspLog, seed: int) -> GraspLog:
+    """Nine elements whose forces come in steps of .1 N, ten times their noise, of a grasp with its own force."""
+    generator = np.random.default_rng(seed)
+    load = np.interp(np.arange(len(ramp)), [0, 30, 60], [0.0, 1.0, 1.0])[:, None, None, None]
+    force = load * generator.normal(1.0, 0.01) * np.array([0.2, 0.1, -0.6]) * np.ones((3, 3, 1))
+    force = np.round((force + generator.normal(0.0, 0.01, force.shape)) / 0.1) * 0.1
+    shown = ramp.displacement[:, 2:5, 2:5]
+    return GraspLog(ramp.time, ramp.position[2:5, 2:5], shown, ramp.element_area, force=force)
+
+
+def test_grasps_of_few_elements_in_coarse_steps_are_not_taken_for_one(ramp: GraspLog) -> None:
+    """Of eight grasps in steps of .1 N one had counted."""
+    logs = [coarse(ramp, seed) for seed in range(4)]
+    assert not any(alike(one, other) for one, other in pairwise(logs))
+    grasps = Grasps()
+    assert len({grasps.of(log, is_touched=True) for log in logs}) == 4
+    assert grasps.of(replace(logs[1], time=ramp.time + 1.0), is_touched=True) == fingerprint(logs[1])
+
+
+def test_the_frames_of_a_log_are_ordered_once_for_all_comparisons(
+    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of a log of 20,000 frames had been for each of them: 9 s beside 1,000 logs."""
+    ordered: list[int] = []
+
+    def noted(frames: np.ndarray) -> cKDTree:
+        ordered.append(len(frames))
+        return cKDTree(frames)
+
+    monkeypatch.setattr("scipy.spatial.cKDTree", noted)
+    own, others = noisy(ramp, 0).take(slice(-1)), [noisy(ramp, seed) for seed in range(1, 6)]
+    assert find_alike(signature(own), [Signature("a", signature(other)) for other in others]) is None
+    assert sorted(ordered) == [len(own)] + [len(ramp)] * 5
+
+
+def test_grasps_of_files_are_told_apart_by_the_last_of_them(ramp: GraspLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(same_grasp, "MOST_LOGS", 2)
+    grasps = Grasps()
+    logs = [noisy(ramp, seed) for seed in range(3)]
+    marks = [fingerprint(log) for log in logs]
+    cut = logs[0].take(slice(-1))
+    assert [grasps.of(log, is_touched=True) for log in (*logs[:2], cut, cut, logs[2])] == [
+        *marks[:2],
+        *marks[:1] * 2,
+        marks[2],
+    ]
+    assert grasps.of(logs[1].take(slice(-1)), is_touched=True) != marks[1]  # two came since
+    assert grasps.of(logs[1], is_touched=True) == marks[1]
+    assert grasps.of(logs[2].take(slice(-1)), is_touched=False) != marks[2]
+
+
 def test_a_note_names_the_copies_and_what_to_do() -> None:
     v, f_n, mu = (np.random.default_rng(2).uniform(0.1, 1.0, 50) for _ in range(3))
     samples = FrictionSamples(mu, v, f_n, mu * f_n, v, np.arange(50) % 9, np.ones(50), 1e-6)
@@ -132,4 +185,4 @@ def test_a_reading_that_is_odd_makes_no_grasp_like_another(ramp: GraspLog, readi
 
 
 def test_forces_are_never_like_displacements(ramp: GraspLog) -> None:
-    assert not is_alike(signature(ramp), signature(replace(ramp, force=None)))
+    assert not alike(ramp, replace(ramp, force=None))

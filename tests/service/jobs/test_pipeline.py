@@ -23,6 +23,7 @@ from service.domain.collect_friction import collect
 from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
 from service.domain.recommended import recommended
+from service.domain.same_grasp import find_alike
 from service.domain.sensors import NAMELESS
 from service.domain.stored_results import (
     SAMPLE_ARRAYS,
@@ -201,11 +202,28 @@ def test_a_grasp_that_was_sent_in_several_files_counts_once(shop: Shop, content:
         assert found.findings[0].name == "same grasp"
 
 
+def test_the_whole_log_counts_where_a_short_cut_of_it_came_first(shop: Shop, content: bytes, ramp: GraspLog) -> None:
+    """The cut had counted alone."""
+    shop.run(shop.ingest(content)[1])
+    alone = hierarchical_model(shop).model
+    with shop.database.write() as session:
+        steel = materials.create(session, "steel", "").id
+    shop.material_id = steel
+    short, job = shop.ingest(encode(ramp.take(slice(76))))
+    assert shop.run(job).status == "done"
+    shop.run(shop.ingest(content)[1])
+    with shop.database.read() as session:
+        models = materials.get(session, "steel").models
+    whole = next(each.model for each in models if each.model.method == "hierarchical")
+    assert (whole.coefficients, whole.n) == (alone.coefficients, alone.n)
+    assert f"({short} of " in str(whole.diagnostics["same_grasps"])
+
+
 def test_a_cut_log_that_is_looked_at_meanwhile_does_not_count_either(
     shop: Shop, content: bytes, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither of two jobs at once has seen the other's grasp before both store theirs."""
-    _, job = shop.ingest(encode(ramp.take(slice(-1))))
+    log_id, job = shop.ingest(encode(ramp.take(slice(-1))))
     check = pipeline.slipcore.check_log
 
     def check_late(*arguments: Any) -> Any:
@@ -218,6 +236,33 @@ def test_a_cut_log_that_is_looked_at_meanwhile_does_not_count_either(
     with shop.database.read() as session:
         parts = detections.samples_of_material(session, shop.material_id)
     assert [len(part.copies) for part in parts] == [1]
+    found = shop.log(log_id).detection
+    assert found is not None
+    assert found.findings is not None
+    assert "same grasp" in {finding.name for finding in found.findings}
+
+
+def test_logs_are_compared_while_others_may_write(
+    shop: Shop, content: bytes, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What another job stores between the comparison and the storing is compared, too."""
+    log_id, job = shop.ingest(encode(ramp.take(slice(-1))))
+    found: list[bool] = []
+
+    def compare_while_another_stores(*given: Any) -> Any:
+        alike = find_alike(*given)
+        found.append(alike is not None)
+        if len(found) == 1:
+            shop.run(shop.ingest(content)[1])
+        return alike
+
+    monkeypatch.setattr(pipeline, "find_alike", compare_while_another_stores)
+    assert shop.run(job).status == "done"
+    assert found == [False, False, True]  # of ours, of the other, and of ours with that
+    told = shop.log(log_id).detection
+    assert told is not None
+    assert told.findings is not None
+    assert told.findings[0].name == "same grasp"
 
 
 def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes) -> None:

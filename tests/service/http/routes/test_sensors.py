@@ -294,7 +294,7 @@ def test_a_log_is_looked_at_again_whatever_the_trail_holds_and_the_clocks_say(
     assert send(**asked).json()["job"]["status"] != "queued"
 
 
-@pytest.mark.parametrize("missing", ["findings", "fingerprint"])
+@pytest.mark.parametrize("missing", ["findings", "signature"])
 def test_a_log_of_before_the_checks_is_looked_at_once_it_is_sent_again(
     reach: Callable[..., Any], database: Database, blobs: BlobStore, content: bytes, missing: str
 ) -> None:
@@ -309,9 +309,22 @@ def test_a_log_of_before_the_checks_is_looked_at_once_it_is_sent_again(
     run_next(database, blobs)
     with database.read() as session:
         found = grasp_logs.get(session, log_id).detection
+        assert detections.has_signature(session, log_id)
     assert found is not None
-    assert None not in (found.findings, found.fingerprint)
+    assert found.findings is not None
     assert send(material="paper").json()["job"]["status"] == "done"
+
+
+def test_a_log_that_nothing_touches_is_looked_at_once(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, ramp: GraspLog
+) -> None:
+    """Nothing is kept by which its grasp is known again, as of logs that a version before did not look at for that."""
+    assert ramp.force is not None
+    still = replace(ramp, displacement=0.0 * ramp.displacement, force=0.0 * ramp.force, object_pose=None, truth=None)
+    send = lab_that_sends(reach, encode(still))
+    send().raise_for_status()
+    run_next(database, blobs)
+    assert send().json()["job"]["status"] == "done"
 
 
 def test_who_names_no_sensor_is_told_to_name_one(
