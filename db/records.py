@@ -277,6 +277,16 @@ class Detection:
     fingerprint: str | None = None
 
 
+class SeenClock(NamedTuple):
+    """When a server last looked at the clock, ``at``; for how many seconds it has been ``steady`` while one looked; and
+    the number of the newest log as that began.
+    """
+
+    at: datetime
+    steady: float
+    log_number: int
+
+
 class Signature(NamedTuple):
     """By which the grasp of a log is known again, and the fingerprint that all logs of that grasp have."""
 

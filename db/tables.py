@@ -426,6 +426,8 @@ class StoreRow(Base):
     """The id that the database shares with the blob store of its files (``db.identity``): one row, or none yet.
 
     ``webhook_entry_id``: the newest entry of the audit trail that the webhook has had or is never to have.
+    ``clock_seen_at``: when a server last looked at the clock, by which uploads grow old; ``clock_steady_seconds`` for
+    which it has been steady while one looked, and ``clock_log_number`` of the newest log as that began.
     """
 
     __tablename__ = "store"
@@ -435,3 +437,6 @@ class StoreRow(Base):
     id: Mapped[str] = mapped_column(String(32))
     created_at: Mapped[datetime] = mapped_column(default=now)
     webhook_entry_id: Mapped[int | None]
+    clock_seen_at: Mapped[datetime | None]
+    clock_steady_seconds: Mapped[float | None]
+    clock_log_number: Mapped[int | None]

@@ -4,6 +4,7 @@ from sqlalchemy import inspect, select, text, update
 from sqlalchemy.orm import Session
 
 from db.errors import StorageUnavailable
+from db.records import SeenClock
 from db.tables import StoreRow
 
 
@@ -40,6 +41,21 @@ def set_webhook_entry(session: Session, entry_id: int, before: int | None) -> No
     session.execute(
         update(StoreRow).where(StoreRow.webhook_entry_id.is_not_distinct_from(before)).values(webhook_entry_id=entry_id)
     )
+
+
+def seen_clock(session: Session) -> SeenClock | None:
+    """The clock as a server last looked at it; None where none has."""
+    row = session.scalar(select(StoreRow))
+    if row is None or row.clock_seen_at is None:
+        return None
+    return SeenClock(row.clock_seen_at, row.clock_steady_seconds or 0.0, row.clock_log_number or 0)
+
+
+def note_clock(session: Session, seen: SeenClock) -> None:
+    """Note how the clock was seen."""
+    at, steady, number = seen
+    noted = {"clock_seen_at": at, "clock_steady_seconds": steady, "clock_log_number": number}
+    session.execute(update(StoreRow).values(noted))
 
 
 def touch(session: Session) -> None:

@@ -39,6 +39,18 @@ def newest(session: Session) -> datetime | None:
     return session.scalar(select(func.max(GraspLogRow.created_at)))
 
 
+def newest_number(session: Session) -> int:
+    """The number of the log that came in last; 0 where none is."""
+    return session.scalar(select(func.max(GraspLogRow.number))) or 0
+
+
+def count_as_new(session: Session, number: int, at: datetime) -> None:
+    """Let files of logs that came in after this number be as old as of then, at most."""
+    since_then = (GraspLogRow.number > number, GraspLogRow.file_since < at, GraspLogRow.file_state.is_(None))
+    counted = update(GraspLogRow).where(*since_then).values(file_since=at)
+    session.execute(counted.execution_options(synchronize_session=False))
+
+
 def count_old(session: Session, before: datetime) -> tuple[int, int]:
     """How many files may go, those older than ``before`` that nothing needs, and their bytes."""
     files = _old(before).add_columns(GraspLogRow.bytes).distinct().subquery()

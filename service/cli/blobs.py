@@ -28,15 +28,19 @@ def prune(
     ] = None,
     delete: Annotated[bool, typer.Option("--delete", help="Delete what is otherwise only listed.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go, also with an age.")] = False,
+    trust_clock: Annotated[
+        bool, typer.Option("--trust-clock", help="Delete by a clock that nothing stored vouches for.")
+    ] = False,
     database_url: Url = None,
 ) -> None:
     """Say what may be deleted, and with --delete do so: old uploads, and files to which nothing refers.
 
     Uploads go once they are older than an age, if their jobs have ended; what was found in them stays. Unreferenced
     files are set aside first. The service may run meanwhile. --older-than without --delete is about old uploads only,
-    and without --dry-run deletes them, as it always did.
+    and without --dry-run deletes them, as it always did. Nothing is deleted by a clock that may be wrong.
     """
     from db import identity, migrate
+    from service.jobs.steady_clock import doubt
     from service.settings import Settings
 
     if delete and dry_run:
@@ -49,6 +53,10 @@ def prune(
         migrate.check(database)
         blobs = opened_blobs()
         identity.verify(database, blobs)
+        with database.read() as session:
+            doubtful = None if trust_clock or not (delete or (uploads_only and not dry_run)) else doubt(session)
+        if doubtful is not None:
+            raise typer.BadParameter(f"the clock says {doubtful}; allowed: --trust-clock, where it is right")
         if age is not None:
             _prune_uploads(database, blobs, age, delete=delete or (uploads_only and not dry_run))
         if not uploads_only:

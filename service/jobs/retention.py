@@ -88,12 +88,13 @@ class Retention:
         self._age = None if days is None else timedelta(days=days)
         self._grace = None if unreferenced_days is None else timedelta(days=unreferenced_days)
         self._audit_age = None if audit_days is None else timedelta(days=audit_days)
-        self._next_garbage, self._clock = 0.0, SteadyClock()
+        self._next_garbage, self._clock = 0.0, SteadyClock(database)
         self._thread = PeriodicThread("retention", LOOK_SECONDS, self._look)
 
     def start(self) -> None:
         """Begin, where something is to be kept for some days only."""
         if any(age is not None for age in (self._age, self._grace, self._audit_age)):
+            self._look_at_the_clock()  # before anything is stored by it
             self._thread.start()
 
     async def stop(self) -> None:
@@ -102,7 +103,7 @@ class Retention:
 
     def _look(self) -> None:
         try:
-            if not self._clock.is_believed(self._newest()) or not self._leads():
+            if not self._leads() or not self._clock.is_believed():
                 return
             if self._age is not None:
                 self._prune(self._age)
@@ -115,9 +116,11 @@ class Retention:
         except Exception:
             logger.exception("nothing old is deleted")
 
-    def _newest(self) -> datetime | None:
-        with self._database.read() as session:
-            return uploads.newest(session)
+    def _look_at_the_clock(self) -> None:
+        try:
+            self._clock.is_believed()
+        except DatabaseError as error:
+            logger.warning("the clock is not looked at: %s", error)
 
     def _prune(self, age: timedelta) -> None:
         if deleted := prune(self._database, self._blobs, now() - age, lambda: self._thread.is_stopping):

@@ -18,6 +18,7 @@ from service.cli import main
 from service.cli.database import command_actor
 from service.jobs import garbage
 from service.jobs.retention import Retention
+from tests.service.jobs.clocks import vouch_for_the_clock
 
 NONE = timedelta(0)
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -102,6 +103,7 @@ def test_the_policy_sets_aside_and_deletes_after_its_days(
     orphan: str, database: Database, blobs: BlobStore, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO")
+    vouch_for_the_clock(database)
     policy = Retention(database, blobs, None, lambda: True, unreferenced_days=7.0)
     policy._look()
     assert list(blobs.quarantine.hashes()) == [orphan]

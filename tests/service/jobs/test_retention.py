@@ -9,7 +9,7 @@ import httpx
 import pytest
 from sqlalchemy import select, update
 
-from db import migrate
+from db import migrate, tables
 from db.blobs import BlobStore, Spool, open_blobs
 from db.database import Database
 from db.errors import SchemaMismatch
@@ -27,6 +27,7 @@ from service.jobs.retention import Retention, prune
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client.container import encode
+from tests.service.jobs.clocks import vouch_for_the_clock
 from tests.waiting import wait_until
 
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
@@ -233,6 +234,7 @@ def test_a_server_deletes_old_uploads_by_itself(
         data_folder=tmp_path, database_url=database.url, keep_uploads_days=90, lease_seconds=0.5, shutdown_seconds=0
     )
     with serving(settings) as client:
+        vouch_for_the_clock(database)
         log = upload(client, content).json()["id"]
         with database.write() as session:
             session.execute(update(GraspLogRow).values(file_since=now() - 2 * AGE))
@@ -295,6 +297,30 @@ def test_the_command_counts_and_deletes(
         assert (code, told.splitlines()[0]) == (0, "0 uploads (0 bytes) would be deleted")
 
 
+@ONLY_SQLITE
+def test_the_command_deletes_by_no_clock_that_is_far_ahead(
+    shelf: Shelf, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four fresh uploads had gone by one that was 200 days ahead."""
+
+    def run(*options: str) -> tuple[int, str]:
+        with pytest.raises(SystemExit) as ending:
+            main(["blobs", "prune", "--database-url", shelf.database.url, "--older-than", "90d", *options])
+        return int(ending.value.code or 0), " ".join(capsys.readouterr().err.replace("│", " ").split())
+
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
+    log_id = shelf.store(content, days=0)
+    for module in (steady_clock, tables):
+        monkeypatch.setattr(module, "now", lambda: now() + timedelta(days=200))
+    code, told = run()
+    assert (code, "--trust-clock" in told, "the newest log is of" in told) == (2, True, True)
+    assert run("--delete")[0] == 2
+    assert run("--dry-run")[0] == 0
+    assert shelf.file(log_id).status_code == httpx.codes.OK
+    assert run("--trust-clock")[0] == 0
+    assert shelf.file(log_id).status_code == httpx.codes.GONE
+
+
 def test_logs_of_before_have_their_files_and_those_without_stop_the_way_back(shelf: Shelf, content: bytes) -> None:
     log_id = shelf.store(content, days=91)
     migrate.downgrade(shelf.database, "0006", lose=True)
@@ -313,6 +339,7 @@ def test_nothing_is_deleted_by_a_clock_that_jumps(
     shelf: Shelf, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log_id = shelf.store(content, days=1)
+    vouch_for_the_clock(shelf.database)
     kept = Retention(shelf.database, shelf.blobs, 90.0, lambda: True)
     kept._look()
     for module in (retention, steady_clock):
@@ -327,6 +354,7 @@ def test_old_entries_of_the_audit_trail_are_deleted_where_that_is_set(database: 
         for days in (29, 31):
             entry = AuditEntryRow(at=now() - timedelta(days=days), actor="service", action="x", subject="y", details={})
             session.add(entry)
+    vouch_for_the_clock(database)
     for policy, left in ((None, 2), (30.0, 2)):  # one goes, and one that tells so comes
         Retention(database, blobs, None, lambda: True, audit_days=policy)._look()
         with database.read() as session:

@@ -1,9 +1,14 @@
 from datetime import UTC, datetime, timedelta
 
 import pytest
+from sqlalchemy import select, update
 
+from db.database import Database
+from db.records import NewGraspLog
+from db.repositories import grasp_logs, stores
+from db.tables import GraspLogRow
 from service.jobs import steady_clock
-from service.jobs.steady_clock import STEADY, SteadyClock
+from service.jobs.steady_clock import STEADY, SteadyClock, doubt
 
 BEGIN = datetime(2026, 11, 26, tzinfo=UTC)
 
@@ -34,42 +39,137 @@ def clocks(monkeypatch: pytest.MonkeyPatch) -> Clocks:
 
 
 LOOK = timedelta(minutes=1)
+DAYS = [timedelta(days=200), timedelta(days=-200), timedelta(hours=1)]
 
 
-@pytest.mark.parametrize("by", [timedelta(days=200), timedelta(days=-200), timedelta(hours=1)])
-def test_a_clock_that_jumps_is_not_believed_for_a_day(clocks: Clocks, by: timedelta) -> None:
-    """One that was 200 days ahead for a minute had deleted all uploads."""
-    clock = SteadyClock()
-    assert clock.is_believed(BEGIN)
-    clocks.go(LOOK, by)
-    assert not clock.is_believed(BEGIN)
-    clocks.go(LOOK)
-    assert not clock.is_believed(BEGIN)
-    clocks.go(LOOK, -by)  # set right again
-    assert not clock.is_believed(BEGIN)
-    clocks.go(STEADY - LOOK)
-    assert not clock.is_believed(BEGIN)
-    clocks.go(LOOK)
-    assert clock.is_believed(BEGIN)
+@pytest.fixture
+def store(database: Database) -> Database:
+    with database.write() as session:
+        stores.set_id(session, "1" * 32)
+    return database
 
 
-def test_a_clock_that_is_set_by_seconds_is_believed(clocks: Clocks) -> None:
-    clock = SteadyClock()
-    for step in (0.0, 5.0, -5.0, 30.0):
-        assert clock.is_believed(BEGIN)
-        clocks.go(LOOK, timedelta(seconds=step))
-
-
-@pytest.mark.parametrize(("days", "is_believed"), [(0.5, True), (2.0, False), (200.0, False)])
-def test_at_a_start_far_beyond_what_is_stored_it_is_believed_a_day_later(
-    clocks: Clocks, days: float, is_believed: bool
-) -> None:
-    clock, newest = SteadyClock(), BEGIN - timedelta(days=days)
-    assert clock.is_believed(newest) == is_believed
+def believed(clock: SteadyClock, clocks: Clocks) -> SteadyClock:
+    """The clock, once it is."""
+    assert not clock.is_believed()
     clocks.go(STEADY)
-    assert clock.is_believed(newest)
+    assert clock.is_believed()
+    return clock
 
 
-def test_where_nothing_is_stored_there_is_nothing_to_compare_with(clocks: Clocks) -> None:
-    assert SteadyClock().is_believed(None)
-    assert clocks.now() == BEGIN
+def log_of(store: Database, clocks: Clocks) -> str:
+    """A log that comes in now."""
+    with store.write() as session:
+        log_id = grasp_logs.add(
+            session, NewGraspLog(f"{clocks.monotonic_:064.0f}", 1, "npz", "x", None, "s", 2, 1.0, (2, 2))
+        )
+        own = update(GraspLogRow).where(GraspLogRow.id == log_id)
+        session.execute(own.values(created_at=clocks.wall, file_since=clocks.wall))
+    return log_id
+
+
+def since(store: Database, log_id: str) -> datetime:
+    with store.read() as session:
+        return session.scalars(select(GraspLogRow.file_since).where(GraspLogRow.id == log_id)).one()
+
+
+@pytest.mark.parametrize("by", DAYS)
+def test_a_clock_that_jumps_is_not_believed_for_a_day(store: Database, clocks: Clocks, by: timedelta) -> None:
+    """One that was 200 days ahead for a minute had deleted all uploads."""
+    clock = believed(SteadyClock(store), clocks)
+    clocks.go(LOOK, by)
+    assert not clock.is_believed()
+    clocks.go(LOOK)
+    assert not clock.is_believed()
+    clocks.go(LOOK, -by)  # set right again
+    assert not clock.is_believed()
+    clocks.go(STEADY - LOOK)
+    assert not clock.is_believed()
+    clocks.go(LOOK)
+    assert clock.is_believed()
+
+
+def test_a_clock_that_is_set_by_seconds_is_believed(store: Database, clocks: Clocks) -> None:
+    clock = believed(SteadyClock(store), clocks)
+    for step in (0.0, 5.0, -5.0, 30.0):
+        clocks.go(LOOK, timedelta(seconds=step))
+        assert clock.is_believed()
+
+
+@pytest.mark.parametrize("by", DAYS[:2])
+def test_a_clock_that_is_wrong_at_a_start_is_not_believed(store: Database, clocks: Clocks, by: timedelta) -> None:
+    """Nor at the next, whatever comes in meanwhile: by one log, which it dated itself, it had deleted all."""
+    believed(SteadyClock(store), clocks)
+    clocks.go(LOOK, by)
+    for _ in range(3):
+        clock = SteadyClock(store)
+        assert not clock.is_believed()
+        log_of(store, clocks)
+        clocks.go(LOOK)
+        assert not clock.is_believed()
+
+
+def test_a_service_that_is_started_daily_believes_the_clock_at_last(store: Database, clocks: Clocks) -> None:
+    """Whatever the age of its newest log, by which it had not."""
+    told = []
+    for _ in range(4):
+        clock = SteadyClock(store)
+        clock.is_believed()
+        clocks.go(timedelta(hours=8))
+        told.append(clock.is_believed())
+        clocks.go(timedelta(hours=16))
+    assert told == [False, False, True, True]
+
+
+def test_time_without_a_look_does_not_count(store: Database, clocks: Clocks) -> None:
+    """Nor that in which another process looked counts twice."""
+    first, other = SteadyClock(store), SteadyClock(store)
+    assert not first.is_believed()
+    assert not other.is_believed()
+    clocks.go(timedelta(hours=13))
+    assert not first.is_believed()
+    assert not other.is_believed()
+    clocks.go(timedelta(hours=10))
+    assert not SteadyClock(store).is_believed()
+
+
+def test_what_came_in_by_a_clock_that_was_behind_counts_as_new(store: Database, clocks: Clocks) -> None:
+    """It had been deleted minutes after the clock was set, or a day after."""
+    clock = believed(SteadyClock(store), clocks)
+    before = log_of(store, clocks)
+    at = clocks.wall
+    clocks.go(LOOK, -timedelta(days=200))
+    clock.is_believed()
+    behind = log_of(store, clocks)
+    clocks.go(LOOK, timedelta(days=200))
+    clock.is_believed()
+    assert since(store, behind) == clocks.wall
+    assert abs(since(store, before) - at) <= 3 * LOOK
+
+
+def test_what_came_in_before_the_first_look_at_a_new_clock_counts_as_new(store: Database, clocks: Clocks) -> None:
+    SteadyClock(store).is_believed()
+    log = log_of(store, clocks)
+    clocks.go(LOOK, timedelta(days=200))
+    SteadyClock(store).is_believed()
+    assert since(store, log) == clocks.wall
+
+
+def doubts(store: Database) -> str:
+    with store.read() as session:
+        return doubt(session) or ""
+
+
+def test_a_command_doubts_a_clock_that_no_server_vouches_for(store: Database, clocks: Clocks) -> None:
+    assert not doubts(store)
+    log_of(store, clocks)
+    clocks.go(STEADY + LOOK)
+    assert "the newest log is of 2026-11-26" in doubts(store)
+    clock = SteadyClock(store)
+    clock.is_believed()
+    assert "has jumped lately" in doubts(store)
+    clocks.go(STEADY)
+    clock.is_believed()
+    assert not doubts(store)
+    clocks.go(timedelta(days=200))
+    assert "a server last saw 2026-11-28" in doubts(store)
