@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel, InvalidSamples, Probing, Scale, Scales, WorkingPoint, next_grasp
-from estimators.grasp_design import GOLDEN_ANGLE, SPEEDS, Designs, updated
+from estimators.grasp_design import GOLDEN_ANGLE, SPEEDS, Designs, _forces, scatter, updated
 
 POINT = WorkingPoint(0.1)
 
@@ -154,3 +154,35 @@ def test_a_working_point_that_cannot_be_is_refused(changes: dict[str, float]) ->
 def test_forces_that_cannot_be_are_refused(forces: tuple[float, float]) -> None:
     with pytest.raises(InvalidSamples, match="normal_force"):
         next_grasp(model(), POINT, Probing(normal_force=forces))
+
+
+def test_places_are_spread_by_speed_and_force_about_their_means() -> None:
+    """Half of the speed in the mean; 3 × 3 nodes for half of 60 elements."""
+    probing = replace(Probing(), velocity_spread=0.2, force_spread=0.3, slipping=0.5)
+    designs = Designs.of(np.array([0.1]), 60, replace(probing, speed=(4e-3,), length=(1e-3,)))
+    x, count = designs.places()
+    assert x.shape == (1, 9, 3)
+    share = count / count.sum()
+    assert count.sum() == pytest.approx(30.0)
+    np.testing.assert_allclose(share @ x[0], [1.0, 2e-3, 0.1], rtol=1e-12)
+    np.testing.assert_allclose(np.sqrt(share @ (x[0] - share @ x[0]) ** 2), [0.0, 0.2 * 2e-3, 0.03], rtol=1e-9)
+    assert designs.seconds[0] == pytest.approx(probing.seconds + 0.25)
+    assert Designs.of(np.array([0.1]), 1, probing).places()[1].sum() == pytest.approx(1.0)  # one at least
+
+
+def test_scatter_that_a_method_does_not_separate_counts_as_that_of_whole_grasps() -> None:
+    """0.05 of the friction in the middle of the domain, 0.45 + 8 · 2.1e-3 − 0.8 · 0.125."""
+    separate = model()
+    assert scatter(separate) == (0.05, 0.02, 0.03)
+    friction = 0.45 + 8.0 * 2.1e-3 - 0.8 * 0.125
+    assert scatter(replace(separate, scales=None)) == pytest.approx((0.05 / friction, 0.0, 0.05))
+
+
+def test_forces_go_from_half_of_the_least_to_twice_the_largest_seen_with_the_working_point_among_them() -> None:
+    known, probing = model(np.zeros((3, 3))), replace(Probing(), load=0.0)
+    forces = _forces(known, POINT, probing)
+    assert (forces.min(), forces.max(), forces[-1]) == (pytest.approx(0.025), pytest.approx(0.4), 0.1)
+    beyond = _forces(known, WorkingPoint(0.7), probing)
+    assert beyond.max() == pytest.approx(0.7)
+    chosen = _forces(known, POINT, replace(probing, normal_force=(0.2, 0.3)))
+    assert (chosen.min(), chosen.max(), chosen[-1]) == (pytest.approx(0.2), pytest.approx(0.3), 0.2)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,7 +14,17 @@ from estimators import recognise
 from estimators.defaults import RECOGNITION
 from estimators.linear.fit_data import gather
 from estimators.linear.place_errors import error_of_places
-from estimators.recognition import LogDensity, _known, _of_the_population, log_predictive
+from estimators.recognition import (
+    LogDensity,
+    _belief,
+    _integral,
+    _known,
+    _of_the_population,
+    _root,
+    _scatter,
+    _shared,
+    log_predictive,
+)
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
@@ -212,3 +223,51 @@ def test_places_shift_nothing_along_what_samples_do_not_tell() -> None:
     still = error_of_places(gather(replace(grasp, tangential_velocity=np.zeros(len(grasp)))))
     assert not still[1].any()
     assert 0.0 < still[0, 0] < 1.0
+
+
+def test_an_integral_closes_in_on_what_matters() -> None:
+    """Of a normal density a thousandth as wide as the range, and its height."""
+    found = _integral(lambda x: 3.0 - 0.5 * ((x - 0.3) / 1e-2) ** 2, np.array(-5.0), np.array(5.0))
+    assert found == pytest.approx(3.0 + np.log(1e-2 * np.sqrt(2.0 * np.pi)), abs=1e-6)
+
+
+def test_the_root_of_a_covariance_may_be_singular_and_of_any_units() -> None:
+    turned = np.array([1e-3, 1e4, 0.0])
+    covariance = np.outer(turned, turned) + np.diag([1e-6, 0.0, 0.0])
+    root = _root(covariance)
+    np.testing.assert_allclose(root @ root.T, covariance, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(_root(np.stack([covariance, 4.0 * covariance]))[1], 2.0 * root, rtol=1e-12)
+
+
+def test_a_prior_is_relative_and_of_each_material() -> None:
+    materials = dict.fromkeys("ab", cast("estimators.FrictionModel", None))
+    assert _belief(materials, {"a": 3.0, "b": 1.0}) == pytest.approx({"a": np.log(0.75), "b": np.log(0.25)})
+    assert _belief(materials, None) == pytest.approx({"a": np.log(0.5), "b": np.log(0.5)})
+    for wrong in ({"a": 1.0}, {"a": 1.0, "b": 0.0}, {"a": 1.0, "b": 1.0, "c": 1.0}):
+        with pytest.raises(estimators.InvalidSamples, match="prior"):
+            _belief(materials, wrong)
+
+
+def test_the_scatter_of_a_sample_is_that_of_places_and_within_together(samples: Make) -> None:
+    """3² + 4² on 9 and 16 degrees of freedom: 25²/(3⁴/9 + 4⁴/16)."""
+    model = estimators.fit(samples(50))
+    assert _scatter(model) == (model.scale, model.scatter_degrees_of_freedom)
+    scales = estimators.Scales(*(estimators.Scale(*each) for each in ((7.0, 3.0), (3.0, 9.0), (4.0, 16.0))))
+    assert _scatter(replace(model, scales=scales)) == (5.0, pytest.approx(625.0 / 25.0))
+    none = estimators.Scale(0.0, 5.0)
+    assert _scatter(replace(model, scales=replace(scales, between_places=none, within=none))) == (0.0, 50.0)
+
+
+def test_a_grasps_law_is_off_by_coefficients_places_and_whole_grasps(samples: Make) -> None:
+    """With scales on endless degrees of freedom one covariance; on few, quantiles of equal probability."""
+    data, places = gather(samples(50)), np.diag([1.0, 2.0, 3.0])
+    model = replace(estimators.fit(samples(50)), coefficients=np.array([0.5, 2.0, -1.0]), covariance=np.eye(3))
+    np.testing.assert_array_equal(_shared(data, places, model), [np.eye(3)])
+    tau, omega = estimators.Scale(0.1, np.inf), estimators.Scale(0.2, 5.0)
+    known = replace(model, scales=estimators.Scales(tau, omega, omega))
+    law = np.outer(model.coefficients, model.coefficients)
+    np.testing.assert_allclose(_shared(data, places, known), [np.eye(3) + 0.04 * places + 0.01 * law], rtol=1e-12)
+    open_ = replace(model, scales=estimators.Scales(replace(tau, degrees_of_freedom=8.0), omega, omega))
+    ratio = (_shared(data, places, open_) - np.eye(3) - 0.04 * places)[:, 0, 0] / (0.01 * 0.25)
+    shares = (np.arange(RECOGNITION.nodes) + 0.5) / RECOGNITION.nodes
+    np.testing.assert_allclose(np.sort(ratio), np.sort(8.0 / stats.chi2(8.0).isf(shares)), rtol=1e-9)
