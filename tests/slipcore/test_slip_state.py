@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from slipcore.slip_state import SlipState, observed_over_time, slip_events
+from slipcore.slip_state import SlipHistory, SlipState, _of_neighbours, element_states, observed_over_time, slip_events
 
 
 def field(*frames: list[int]) -> np.ndarray:
@@ -70,3 +71,65 @@ def test_what_was_observed_is_none_where_all_was() -> None:
     observed = observed_over_time([whole, whole.masked(contact, contact)])
     assert observed is not None
     np.testing.assert_array_equal(observed, np.stack([np.ones_like(contact), contact]))
+
+
+def test_an_elements_state_counts_from_no_contact_over_stick_to_slip() -> None:
+    contact, slip = np.array([False, True, True, False]), np.array([False, False, True, True])
+    assert element_states(contact, slip).tolist() == [0, 1, 2, 0]
+
+
+def test_neighbours_across_a_corner_count_half() -> None:
+    ones = np.ones((1, 3, 3))
+    assert _of_neighbours(ones)[0].tolist() == [[2.5, 4.0, 2.5], [4.0, 6.0, 4.0], [2.5, 4.0, 2.5]]
+    corner = np.zeros((1, 3, 3))
+    corner[0, 0, 0] = 2.0
+    assert _of_neighbours(corner)[0].tolist() == [[0.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
+
+
+def history(contact: np.ndarray, slip: np.ndarray, observed: np.ndarray | None = None) -> SlipHistory:
+    probability = np.where(slip, 0.8, 0.1)
+    events = slip_events(TIME[: len(contact)], contact, slip)
+    return SlipHistory(
+        TIME[: len(contact)],
+        contact,
+        slip,
+        probability,
+        np.zeros(len(contact)),
+        np.zeros((*contact.shape, 2)),
+        np.ones(len(contact), bool),
+        events,
+        1e-6,
+        "filter",
+        observed=observed,
+    )
+
+
+def test_an_element_that_was_not_observed_is_as_most_of_its_neighbours() -> None:
+    """The middle of the upper row: of 1 + 1 + 1 beside and 2 halves across the corners 2.5 touch, and slip by 0.8."""
+    contact, slip = field([0, 2, 3]), field([0, 2, 3])
+    observed = ~field([1])
+    filled = history(contact, slip, observed).filled()
+    assert filled.contact[0, 0, 1]
+    assert filled.slip[0, 0, 1]
+    assert filled.probability[0, 0, 1] == pytest.approx(0.8)
+    assert filled.stick_ratio.tolist() == [0.0]
+    assert filled.macro_slip.tolist() == [True]
+    few = history(field([0, 3]), field([0]), observed).filled()  # 1.5 of 4
+    assert not few.contact[0, 0, 1]
+    assert few.stick_ratio.tolist() == [0.5]
+    assert few.macro_slip.tolist() == [False]
+    assert np.isnan(history(field([]), field([]), observed).filled().stick_ratio[0])
+
+
+def test_of_which_half_slips_an_element_sticks() -> None:
+    filled = history(field([0, 2, 3, 5]), field([0]), ~field([1])).filled()
+    assert filled.contact[0, 0, 1]
+    assert filled.probability[0, 0, 1] == pytest.approx((0.8 + 0.1 + 0.5 * 0.1 + 0.5 * 0.1) / 3.0)
+    assert not filled.slip[0, 0, 1]
+
+
+def test_a_table_of_a_history_counts_elements_by_frame() -> None:
+    table = history(field([0, 1, 2], [5]), field([1], [])).to_dataframe()
+    assert table["elements_in_contact"].tolist() == [3, 1]
+    assert table["elements_in_slip"].tolist() == [1, 0]
+    assert table.index.tolist() == [0.5, 0.7]
