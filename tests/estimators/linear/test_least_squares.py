@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from estimators.defaults import LINEAR
-from estimators.linear.least_squares import Factor, condition_number, factorise, merge, solve
+from estimators.linear.least_squares import (
+    Factor,
+    condition_number,
+    factorise,
+    merge,
+    solve,
+    triangular_inverse,
+    upper_triangle,
+)
 
 STRD = Path(__file__).parents[4] / "shared" / "data" / "strd"
 DEGREE = {"filip": 10, "norris": 1, "pontius": 2} | {f"wampler{k}": 5 for k in range(1, 6)}
@@ -135,3 +143,46 @@ def test_input_is_left_as_it_was() -> None:
     kept = Factor(factor.weight, factor.mean.copy(), factor.triangle.copy())
     solve(factor)
     np.testing.assert_array_equal(factor.triangle, kept.triangle)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.longdouble])
+def test_a_triangle_has_a_diagonal_of_0_or_more_and_the_rows_sum_of_squares(dtype: type) -> None:
+    rows = np.random.default_rng(3).standard_normal((7, 3)).astype(dtype)
+    for some in (rows, rows[:2]):
+        upper = upper_triangle(some.copy())
+        assert (np.diag(upper) >= 0.0).all()
+        np.testing.assert_array_equal(upper, np.triu(upper))
+        np.testing.assert_allclose((upper.T @ upper).astype(float), (some.T @ some).astype(float), atol=1e-14)
+    whole = np.triu(rows[:3]) + 3.0 * np.eye(3)
+    np.testing.assert_allclose((triangular_inverse(whole) @ whole).astype(float), np.eye(3), atol=1e-14)
+
+
+def test_variance_inflation_is_one_over_what_other_columns_leave() -> None:
+    """Columns of correlation 0.6: 1/(1 − 0.36)."""
+    x = np.array([[1.0, 0.6], [0.0, 0.8], [-1.0, -0.6], [0.0, -0.8]])
+    fit = solve(factorise(np.column_stack([x, x @ [2.0, 3.0]])))
+    np.testing.assert_allclose(fit.inflation, [1.0 / 0.64] * 2, rtol=1e-12)
+    np.testing.assert_allclose(fit.coefficients.astype(float), [0.0, 2.0, 3.0], atol=1e-12)
+    assert (fit.rank, fit.residual_norm) == (2, pytest.approx(0.0, abs=1e-12))
+    assert fit.condition == pytest.approx(np.sqrt(1.6 / 0.4))
+
+
+def test_of_columns_that_are_alike_the_slopes_are_the_smallest_by_their_spans() -> None:
+    """x and 2x with a response of 10x: of b₁ + 2 b₂ = 10 the least (b₁ s₁)² + (b₂ s₂)² has b₁ s₁² = b₂ s₂²/2."""
+    x = np.array([-1.0, 0.0, 1.0, 2.0])
+    factor = factorise(np.column_stack([x, 2.0 * x, 10.0 * x + 1.0]))
+    for spans, slopes in (((1.0, 1.0), (2.0, 4.0)), ((1.0, 2.0), (10.0 / 2.0, 10.0 / 4.0))):
+        fit = solve(factor, np.array(spans))
+        assert fit.rank == 1
+        np.testing.assert_allclose(fit.coefficients.astype(float), [1.0, *slopes], rtol=1e-9, atol=1e-9)
+        unseen = np.array([0.0, 2.0, -1.0])
+        assert unseen @ fit.prior_covariance @ unseen > 0.0
+        seen = np.array([0.0, 1.0, 2.0])
+        assert seen @ fit.prior_covariance @ seen == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_column_that_is_constant_but_for_rounding_says_nothing() -> None:
+    x, flat = np.array([1.0, 2.0, 4.0, 9.0]), np.array([1e3, 1e3 + 1e-13, 1e3, 1e3])
+    fit = solve(factorise(np.column_stack([x, flat, 3.0 * x])), np.ones(2))
+    assert fit.rank == 1
+    np.testing.assert_allclose(fit.coefficients.astype(float)[1:], [3.0, 0.0], atol=1e-9)
