@@ -14,6 +14,7 @@ from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierar
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
 from estimators.linear.sensor_gains import Gains
+from estimators.linear.slopes_of_grasps import with_slopes_that_differ
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
@@ -72,8 +73,8 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
     b̂, along which a grasp scales the law, is the posterior mean of the grid before, of which also follows by how much
     unknown velocities put friction off.
     """
-    grasps = data.grasp_statistics()
     pooled = exact_posterior(data)
+    grasps = with_slopes_that_differ(data.grasp_statistics(), pooled.mean)
     spans = weak_spans(data.domain, data.element_area)
     model = hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior)
     box = _widest(model)

@@ -1,0 +1,73 @@
+"""Slopes within grasps that differ by more than their samples tell: what errors that last as long as a grasp make."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import CLUSTERS, ROUNDING
+from estimators.linear.grasp_statistics import GraspStatistics
+
+FloatArray = NDArray[np.float64]
+
+
+class Slopes(NamedTuple):
+    """Of each grasp: the orthonormal ``axes`` [g, 3, 2] of its rows within places that slopes are told along, zero
+    where there is none; ``regressors`` [g, 2, 2] along them, v and f_n as parts of ``size`` [3]; ``response`` [g, 2].
+    """
+
+    axes: FloatArray
+    regressors: FloatArray
+    response: FloatArray
+    size: FloatArray
+
+
+def with_slopes_that_differ(grasps: Sequence[GraspStatistics], law: FloatArray) -> list[GraspStatistics]:
+    """The same grasps, whose samples within places say so many times less of slopes as grasps differ more in them.
+
+    Errors that go together for as long as a grasp lasts make a slope in it, which no grasp by itself separates from the
+    law's. Were all slopes alike, but for the factor by which the level of their grasp is off the ``law`` [3] of
+    (1, v, f_n), the mean square of what they differ by would be that of the samples (analysis of covariance). The
+    ratio of the two, where it is above 1, divides what the samples say (overdispersion; McCullagh & Nelder, 1989,
+    §4.5).
+    """
+    within = np.stack([grasp.within for grasp in grasps])
+    found = _slopes(within)
+    times = _times(grasps, within, found, law)
+    if times <= 1.0:
+        return list(grasps)
+    lost = 1.0 - 1.0 / np.sqrt(times)
+    rows = within - lost * found.axes @ (found.axes.swapaxes(1, 2) @ within)
+    return [replace(grasp, within=own) for grasp, own in zip(grasps, np.linalg.qr(rows, mode="r"), strict=True)]
+
+
+def _slopes(within: FloatArray) -> Slopes:
+    size = np.sqrt(np.square(within).sum(axis=(0, 1)))
+    scaled = within[..., :2] / np.where(size[:2] > 0.0, size[:2], 1.0)
+    axes, parts, directions = np.linalg.svd(scaled, full_matrices=False)
+    parts[parts <= CLUSTERS.alone] = 0.0
+    axes = axes * (parts > 0.0)[:, None]
+    return Slopes(axes, parts[..., None] * directions, np.einsum("gij,gi->gj", axes, within[..., 2]), size)
+
+
+def _times(grasps: Sequence[GraspStatistics], within: FloatArray, found: Slopes, law: FloatArray) -> float:
+    """Mean square of what slopes differ by, over that of the samples; 1 where the grasps don't tell."""
+    factor = np.array([_factor(grasp, law) for grasp in grasps])
+    rows, response = (factor[:, None, None] * found.regressors).reshape(-1, 2), found.response.ravel()
+    alike, _, rank, _ = np.linalg.lstsq(rows, response, rcond=CLUSTERS.alone)
+    slopes, places = int(np.count_nonzero(rows.any(axis=1))), sum(float(grasp.count.sum()) for grasp in grasps)
+    samples = sum(grasp.total_weight for grasp in grasps) ** 2 / sum(grasp.weight_square for grasp in grasps)
+    left = float(np.square(within[..., 2]).sum() - response @ response)
+    if slopes <= rank or samples <= places + slopes or left <= (ROUNDING * found.size[2]) ** 2:
+        return 1.0
+    misfit = float(np.square(response - rows @ alike).sum())
+    return misfit / (slopes - rank) / (left / (samples - places - slopes))
+
+
+def _factor(grasp: GraspStatistics, law: FloatArray) -> float:
+    """By which the level of a grasp is off the law."""
+    v, f_n, friction = np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count)
+    expected = float(law @ [1.0, v, f_n])
+    return float(friction) / expected if expected else 1.0

@@ -1,0 +1,76 @@
+"""Slopes that grasps show: alike but for the level of each, or apart by more than their samples tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.estimators.lasting_errors import LAW, SAMPLES, found, grasp
+from estimators.linear.fit_data import gather
+from estimators.linear.grasp_statistics import GraspStatistics
+from estimators.linear.slopes_of_grasps import with_slopes_that_differ
+from slipcore.samples import FrictionSamples
+
+
+def statistics(grasps: list[FrictionSamples]) -> list[GraspStatistics]:
+    return list(gather(grasps).grasp_statistics())
+
+
+def squares(grasps: list[GraspStatistics]) -> np.ndarray:
+    return np.stack([each.within.T @ each.within for each in grasps])
+
+
+def divided_by(grasps: list[GraspStatistics]) -> float:
+    """How many times less of slopes samples say."""
+    return float((squares(grasps) / squares(with_slopes_that_differ(grasps, LAW)))[0, 0, 0])
+
+
+@pytest.mark.parametrize("places", [1, 2, 3])
+def test_errors_that_last_as_long_as_a_grasp_make_neither_scatter_nor_certain_slopes(places: int) -> None:
+    """Of twelve grasps that scatter by 3 %, as a force sensor or a few elements record them."""
+    scatter, held = zip(*(found(seed, places) for seed in range(700, 712)), strict=True)
+    assert 0.015 < min(scatter) <= max(scatter) < 0.06
+    assert np.mean(held) > 0.7  # 0.3 to 0.55, were each grasp's slopes as well known as its samples say
+
+
+def test_samples_say_so_many_times_less_as_slopes_differ_more() -> None:
+    """Slopes told by two rows each, along which grasps differ by ± 3 and samples by 1."""
+    one = statistics([grasp(np.random.default_rng(k), 4, 0.0, 0.0) for k in range(2)])
+    rows, left = np.array([[1.0, 0.0], [0.0, 100.0]]), np.sqrt(2 * (4 * SAMPLES - 4 - 2))
+    average = np.array([2e-3, 5.0])
+    made = []
+    for sign in (-1.0, 1.0):
+        told = rows @ LAW[1:] + sign * 3.0
+        within = np.vstack([np.column_stack([rows, told]), [0.0, 0.0, left / np.sqrt(2.0)]])
+        mean = np.tile(np.append(average, LAW @ np.append(1.0, average)), (4, 1))
+        made.append(replace(one[0], mean=mean, within=within))
+    less = with_slopes_that_differ(made, LAW)
+    times = (4 * 9.0 / 2) / (left**2 / (8 * SAMPLES - 8 - 4))
+    for before, after in zip(squares(made), squares(less), strict=True):
+        np.testing.assert_allclose(after[:2], before[:2] / times, rtol=1e-12)
+        told = before[:2, 2] @ np.linalg.solve(before[:2, :2], before[:2, 2])
+        np.testing.assert_allclose(after[2, 2], before[2, 2] - told + told / times, rtol=1e-12)
+    assert times > 10.0
+
+
+def test_slopes_of_independent_errors_are_as_well_known_as_samples_say() -> None:
+    times = [
+        divided_by(statistics([grasp(rng, 3, 0.0, 0.0) for _ in range(6)]))
+        for rng in map(np.random.default_rng, range(60))
+    ]
+    assert np.mean(times) < 1.3  # the mean of the larger of 1 and χ²/10 on 10 degrees of freedom: 1.18
+    assert min(times) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_slopes_that_go_with_the_level_of_their_grasp_do_not_differ() -> None:
+    rng = np.random.default_rng(0)
+    grasps = statistics([grasp(rng, 3, 0.0, 0.1, error=3e-5) for _ in range(12)])
+    assert divided_by(grasps) < 1.6  # of slopes known to a hundredth of what they differ by
+    assert divided_by([replace(each, mean=each.mean * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.48]) for each in grasps]) > 10.0
+
+
+def test_one_grasp_and_grasps_without_error_are_left_as_they_are() -> None:
+    rng = np.random.default_rng(0)
+    for grasps in ([grasp(rng, 3)], [grasp(rng, 3, scatter=0.0, error=0.0) for _ in range(3)]):
+        told = statistics(grasps)
+        assert with_slopes_that_differ(told, LAW) == told
