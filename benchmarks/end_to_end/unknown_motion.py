@@ -35,9 +35,9 @@ BETWEEN_GRASPS, BETWEEN_PLACES = 0.03, 0.02
 GRASPS = ((5.0, 1.0), (7.0, 3.0), (9.0, 0.5), (11.0, 2.0), (13.0, 1.5))
 """Normal force, N, and speed of the object, mm/s."""
 SAMPLING = SensorSampling((20, 20), PITCH, 30.0)
-SECONDS, STEPS = 2.0, 300.0
+SECONDS, STEPS = 2.0, 1200.0
 """Length of a grasp, and steps of the physics in a second."""
-RELAXED = 0.3
+RELAXED = 0.075
 """Part of a step's slip that its speed takes up: friction that changes at once with speed would chatter."""
 METHODS = ("auto", "ols", "bayes")
 CONDITIONS = ("known", "known for three of five", "unknown", "unknown, taken for known")
