@@ -4,7 +4,9 @@ Each public record (benchmarks/estimators/friction_records.py) is cut into block
 fitted, each block as a grasp, and the other half is predicted: which part of its samples lies below the 5 %, 50 % and
 95 % quantiles of an element. Rocks slide at micrometres a second, for which the priors of slopes are not made: their
 velocities count in millimetres. Of the bench also the second half of each stroke, where the record has left the elastic
-ramp. Writes record_halves.json.
+ramp. Beside the methods stand what a normal with the mean and the deviation of the record's own residuals has below the
+same quantiles, and what a prediction has that knows how far the blocks before and after in time are off the law. Writes
+record_halves.json.
 """
 
 import os
@@ -17,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 import estimators
 from benchmarks.estimators.friction_records import ROCKS, bench, rock
@@ -26,7 +29,13 @@ from slipcore.samples import FrictionSamples
 METHODS = ("auto", "hierarchical", "ols", "robust")
 BLOCKS = 40
 QUANTILES = (0.05, 0.5, 0.95)
-COLUMNS = ("record", "blocks", *(f"{method}: below 5, 50, 95 %" for method in METHODS))
+COLUMNS = (
+    "record",
+    "blocks",
+    *(f"{method}: below 5, 50, 95 %" for method in METHODS),
+    "the right normal",
+    "by blocks beside in time",
+)
 
 
 def records() -> dict[str, FrictionSamples]:
@@ -55,12 +64,35 @@ def below(parts: Sequence[FrictionSamples], chosen: NDArray[np.bool_], method: s
     return [float((mu < model.predict(v, f_n, quantile, of="element")).mean()) for quantile in QUANTILES]
 
 
+def residuals(parts: Sequence[FrictionSamples], fitted: Sequence[FrictionSamples]) -> list[NDArray[np.float64]]:
+    """What the samples of each block are off the law of those that were ``fitted``."""
+    model = estimators.fit(fitted, method="hierarchical")
+    return [part.friction_coefficient - model.predict(part.tangential_velocity, part.normal_force) for part in parts]
+
+
+def right_normal(parts: Sequence[FrictionSamples]) -> list[float]:
+    """Part of the samples below each quantile of a normal with the mean and the deviation of their residuals."""
+    off = np.concatenate(residuals(parts, parts))
+    return [float((off < off.mean() + score * off.std()).mean()) for score in special.ndtri(QUANTILES)]
+
+
+def beside(parts: Sequence[FrictionSamples], chosen: NDArray[np.bool_]) -> list[float]:
+    """As ``below``, by a law whose level goes straight from each chosen block to the next in time."""
+    off = residuals(parts, [part for part, use in zip(parts, chosen, strict=True) if use])
+    level, known, rest = np.array([each.mean() for each in off]), np.flatnonzero(chosen), np.flatnonzero(~chosen)
+    missed = [level[k] - np.interp(k, known[known != k], level[known[known != k]]) for k in known]
+    scatter = np.sqrt(np.mean(np.square(missed)) + np.mean([off[k].var() for k in known]))
+    left = np.concatenate([off[k] - np.interp(k, known, level[known]) for k in rest])
+    return [float((left < score * scatter).mean()) for score in special.ndtri(QUANTILES)]
+
+
 def row(name: str, record: FrictionSamples, halves: int) -> list[object]:
     """Means over random halves of one record, by each method."""
     rng, parts = np.random.default_rng(0), blocks_of(record, BLOCKS)
     chosen = [rng.permutation(BLOCKS) < BLOCKS // 2 for _ in range(halves)]
     found = {method: np.mean([below(parts, each, method) for each in chosen], axis=0) for method in METHODS}
-    return [name, BLOCKS, *(" ".join(f"{part:.3f}" for part in found[method]) for method in METHODS)]
+    told = [*found.values(), right_normal(parts), np.mean([beside(parts, each) for each in chosen], axis=0)]
+    return [name, BLOCKS, *(" ".join(f"{part:.3f}" for part in each) for each in told)]
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.estimators.friction_records import DATA, bench, samples_of
-from benchmarks.estimators.record_halves import QUANTILES, below, blocks_of
+from benchmarks.estimators.record_halves import QUANTILES, below, beside, blocks_of, right_normal
 
 
 def test_the_quantiles_of_a_record_of_independent_errors_hold_what_they_say() -> None:
@@ -19,6 +19,18 @@ def test_the_quantiles_of_a_record_of_independent_errors_hold_what_they_say() ->
     chosen = rng.permutation(40) < 20
     for method in ("auto", "ols"):
         assert below(parts, chosen, method) == pytest.approx(QUANTILES, abs=0.015)
+    assert right_normal(parts) == pytest.approx(QUANTILES, abs=0.015)
+    assert beside(parts, chosen) == pytest.approx(QUANTILES, abs=0.015)
+
+
+def test_of_friction_that_wanders_over_the_record_the_blocks_beside_in_time_tell() -> None:
+    rng, count = np.random.default_rng(0), 8000
+    v, f_n, time = rng.uniform(0.0, 5e-3, count), rng.uniform(4.0, 6.0, count), np.arange(count) / 200.0
+    mu = 0.5 + 4.0 * v - 0.01 * f_n + 0.1 * np.exp(-(((time - 17.0) / 6.0) ** 2)) + 0.01 * rng.standard_normal(count)
+    parts = blocks_of(samples_of(time, v, f_n, mu), 40)
+    chosen = [rng.permutation(40) < 20 for _ in range(5)]
+    assert np.mean([beside(parts, each) for each in chosen], axis=0) == pytest.approx(QUANTILES, abs=0.03)
+    assert right_normal(parts)[0] < 0.02  # a hump is not normal
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the public records are not at hand")
