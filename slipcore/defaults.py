@@ -715,7 +715,7 @@ class CheckOptions(Options):
     """Share of the frames in which an element may seem to touch, and count as not touched in the grasp."""
     free_distance: Annotated[int, Option(0, 1000, "elements", "smoothed forces spread over one to three")] = 2
     """From elements that touch, up to which others may feel something of the contact."""
-    least_free: Annotated[int, Option(2, 1000000, "elements", "a mean to half of their scatter")] = 4
+    least_free: Annotated[int, Option(2, 1000000, "elements", "in four corners leaks are alike by symmetry")] = 16
     """Elements beyond that from which they tell the sensor's zero during a grasp."""
     normal_lean: Annotated[float, Option(0.0, 1.0, "rad", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
     """Largest angle by which all normals lean against the surface."""

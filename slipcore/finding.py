@@ -21,6 +21,7 @@ SEVERITIES: dict[str, Severity] = {
     "force pulls": "warning",
     "forces not believed": "note",
     "late forces": "warning",
+    "early forces": "warning",
     "crosstalk": "warning",
     "rounded": "note",
     "lasting noise": "note",

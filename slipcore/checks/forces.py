@@ -44,7 +44,7 @@ def zero_drift(seen: Subject) -> Iterator[Finding]:
         if min(np.count_nonzero(early), np.count_nonzero(late)) < seen.limits.least_rest or not elements.any():
             continue
         moved = np.median(force[late], axis=0) - np.median(force[early], axis=0)
-        off = _alike(moved[elements], force[late][:, elements])
+        off = _alike(moved[elements], force[late][:, elements], may_leak=elements is not touched)
         if 0.0 < seen.limits.zero_share * pressed < off:
             share = f"{off / pressed:.0%} of the force of elements in the grasp"
             evidence = f"elements {where} read {1e3 * off:.2g} mN more at its end than at its begin, {share}"
@@ -53,10 +53,7 @@ def zero_drift(seen: Subject) -> Iterator[Finding]:
 
 
 def _beside_the_contact(seen: Subject) -> tuple[BoolArray, BoolArray, BoolArray, str]:
-    """Elements well away from all that touch more than passingly, in the first and the last fifth of the frames held.
-
-    What leaks out to them of a contact's forces is alike in both.
-    """
+    """Elements well away from all that touch more than passingly, in the first and last fifth of the frames held."""
     from scipy.ndimage import maximum_filter
 
     touching = seen.history.contact.mean(axis=0) > seen.limits.passing_touch
@@ -153,14 +150,17 @@ def _unit(vector: FloatArray) -> FloatArray:
     return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), np.finfo(float).tiny))
 
 
-def _alike(read: FloatArray, readings: FloatArray) -> float:
+def _alike(read: FloatArray, readings: FloatArray, may_leak: bool = False) -> float:
     """What elements read alike, N, beyond noise: of medians [k, 3] of ``readings`` [t, k, 3].
 
-    What differs from element to element, as noise that outlasts the rest does, moves friction nowhere in the mean.
+    What differs from element to element, as noise that outlasts the rest does, moves friction nowhere in the mean. What
+    ``may_leak`` to them of a contact that changes falls off with their distance: it differs by as much as its mean.
     """
     lasting = read.var(axis=0, ddof=min(len(read) - 1, 1))
     passing = 0.5 * np.pi * readings.var(axis=0, ddof=1).mean(axis=0) / len(readings)  # of medians
     noise = np.maximum(lasting, passing) / len(read)
+    if may_leak:
+        noise = noise + np.maximum(lasting - 2.0 * passing, 0.0)  # of two medians that are compared
     return float(np.sqrt(max((read.mean(axis=0) ** 2 - noise).sum(), 0.0)))
 
 

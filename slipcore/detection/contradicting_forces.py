@@ -1,4 +1,4 @@
-"""Forces of a whole log that do not go with its displacement: late ones, and normal force that leaks sideways.
+"""Forces of a whole log that do not go with its displacement: late or early ones, and normal force leaking sideways.
 
 Summed over the lattice, forces on an elastic gel change as displacement does, whatever sticks or slips: along the
 normal ΔΣF = k ΔΣu, along the surface and about the normal likewise. How large k is, and how well that holds, differs
@@ -36,8 +36,10 @@ def agreeing(log: GraspLog) -> tuple[GraspLog, tuple[Finding, ...]]:
     found = []
     if lag := lag_of_forces(changes_of(log)):
         log = brought_forward(log, lag)
-        evidence = f"forces come {lag:.2f} s after the displacement that they go with; slip is found with both at once"
-        found.append(Finding("late forces", evidence, "give both the times at which they were measured"))
+        name, order = ("late forces", "after") if lag > 0.0 else ("early forces", "before")
+        evidence = f"forces come {abs(lag):.2f} s {order} the displacement that they go with"
+        remedy = "give both the times at which they were measured"
+        found.append(Finding(name, f"{evidence}; slip is found with both at once", remedy))
     leak = crosstalk_of(slow_changes_of(log))
     if leak.any() and not _leaves_the_lattice(log):
         assert log.force is not None
@@ -105,7 +107,8 @@ def unexplained(displacement: FloatArray, force: FloatArray) -> float:
 
 
 def lag_of_forces(changes: Changes) -> float:
-    """By how much forces come later than the displacement that they go with, s; 0 where that is not clear.
+    """By how much forces come later than the displacement that they go with, s, negative if they come before it; 0
+    where that is not clear.
 
     Under a load that comes again and again they go with any of several lags, and none is taken.
     """
@@ -117,7 +120,7 @@ def lag_of_forces(changes: Changes) -> float:
     left = np.array(early + late)
     best = int(np.argmin(left))
     near, _ = label(left < CONTRADICTION.largest_left)
-    if best <= most or not near[best]:
+    if best == most or not near[best]:
         return 0.0
     is_one = left[near != near[best]].min(initial=1.0) > left[best] + CONTRADICTION.as_good
     return step * (best - most) if is_one and _is_clear(late[0], float(left[best])) else 0.0
@@ -132,7 +135,9 @@ def _is_clear(before: float, left: float) -> bool:
 
 
 def brought_forward(log: GraspLog, lag: float) -> GraspLog:
-    """The log with the forces that came ``lag`` seconds later; at its end, where none came, the last ones stay."""
+    """The log with the forces that came ``lag`` seconds later; at its end, where none came, the last ones stay, and
+    where ``lag`` is negative the first ones at its begin.
+    """
     assert log.force is not None
     then = np.searchsorted(0.5 * (log.time[1:] + log.time[:-1]), log.time + lag)
     return replace(log, force=log.force[then])

@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from service.domain.calibrate import CORRECTED_BY_ANOTHER
 from service.domain.reconstruct import CONTRADICTED, RECONSTRUCTED
@@ -266,6 +267,17 @@ def with_lasting_noise(log: GraspLog, deviation: float, lasts: float) -> GraspLo
         noise = kept * noise + np.sqrt(1.0 - kept**2) * rng.normal(0.0, deviation, noise.shape)
         frame += noise
     return with_force(log, force)
+
+
+@pytest.mark.parametrize("drift", [0.0, 3e-3])
+def test_what_smoothed_forces_leak_beside_a_contact_is_no_drift(drift: float) -> None:
+    """It grows with the contact, to 5 % of its elements' force here, and falls off with the distance."""
+    ramp = tangential_ramp(points=20, pitch=0.75e-3, normal_force=8.0, marker_noise=1e-6, force_noise=0.0)
+    growing = np.asarray(ramp.force) * np.linspace(0.6, 1.0, len(ramp))[:, None, None, None]
+    smoothed = gaussian_filter(growing, (0.0, 3.5, 3.5, 0.0))
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(smoothed.shape)
+    found = names(drifting(with_force(ramp, smoothed + noise), drift, 0.0, 0.0))
+    assert ("zero drift" in found) == (drift > 0.0)
 
 
 @pytest.mark.parametrize("degrees", [-10.0, -3.0, 3.0, 9.0])

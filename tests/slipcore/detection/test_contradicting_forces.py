@@ -20,9 +20,9 @@ RECORDINGS = Path(__file__).parents[3] / ".cache/tac3d/PyTac3D/example_data"
 
 
 def late(log: GraspLog, lag: float) -> GraspLog:
-    """With forces of ``lag`` seconds before."""
+    """With forces of ``lag`` seconds before; early ones, if that is negative."""
     assert log.force is not None
-    return replace(log, force=log.force[np.maximum(np.arange(len(log)) - round(30.0 * lag), 0)])
+    return replace(log, force=log.force[np.clip(np.arange(len(log)) - round(30.0 * lag), 0, len(log) - 1)])
 
 
 def leaking(log: GraspLog, x: float, y: float) -> GraspLog:
@@ -87,7 +87,7 @@ def test_depth_alone_says_nothing_of_forces_along_the_surface(scene: MakeScene) 
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("lag", [0.1, 0.5])
+@pytest.mark.parametrize("lag", [-0.1, 0.1, 0.5])
 def test_a_lag_is_found_to_a_frame(scene: MakeScene, name: str, lag: float) -> None:
     log = late(scene(name, marker_noise=1e-5, force_noise=2e-3), lag)
     assert lag_of_forces(changes_of(log)) == pytest.approx(lag, abs=1.01 / 30.0)
@@ -100,7 +100,10 @@ def test_crosstalk_is_found_to_a_hundredth_beside_a_lag(scene: MakeScene, name: 
     assert [finding.name for finding in agreeing(late(log, 0.3))[1]] == ["late forces", "crosstalk"]
 
 
-@pytest.mark.parametrize("fault", [lambda log: late(log, 0.5), lambda log: leaking(log, -0.3, 0.0), standing])
+@pytest.mark.parametrize(
+    "fault",
+    [lambda log: late(log, 0.5), lambda log: late(log, -0.1), lambda log: leaking(log, -0.3, 0.0), standing],
+)
 @pytest.mark.parametrize("noise", [1e-6, 1e-5])
 def test_such_forces_are_no_worse_than_none(
     scene: MakeScene, f1_score: Score, fault: Callable[[GraspLog], GraspLog], noise: float
@@ -108,6 +111,13 @@ def test_such_forces_are_no_worse_than_none(
     logs = [scene(name, marker_noise=noise, force_noise=2e-3) for name in ("cond1", "reversal", "ring")]
     alone = [f1_score(log, detect_slip(replace(log, force=None))) for log in logs]
     assert np.mean([f1_score(log, detect_slip(fault(log))) for log in logs]) > np.mean(alone) - 0.01
+
+
+def test_early_forces_are_told_from_late_ones(scene: MakeScene) -> None:
+    log = late(scene("ring", marker_noise=1e-6, force_noise=2e-3), -0.1)
+    (finding,) = agreeing(log)[1]
+    assert (finding.name, finding.severity) == ("early forces", "warning")
+    assert "forces come 0.10 s before the displacement" in finding.evidence
 
 
 def test_it_is_said_and_warned_of(scene: MakeScene) -> None:
