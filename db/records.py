@@ -318,16 +318,18 @@ class SampleSummary:
 class SamplesOfLog:
     """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
 
-    ``findings``: names of what was found against the log, None where it was not looked for; ``sensor``: its name;
-    ``copies``: ids of other logs of the same grasp, which do not count.
+    ``findings``: names of what was found against the log; ``sensor``: its name; ``copies``: ids of other logs of the
+    same grasp, which do not count; ``is_checked``: whether findings and copies were looked for, as older versions did
+    not.
     """
 
     grasp_log_id: str
     samples_blob: str
     moments: bytes | None
-    findings: tuple[str, ...] | None = ()
+    findings: tuple[str, ...] = ()
     sensor: str = ""
     copies: tuple[str, ...] = ()
+    is_checked: bool = True
 
 
 @dataclass(frozen=True, slots=True)

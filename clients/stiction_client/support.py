@@ -72,7 +72,8 @@ class Model(Protocol):
     def diagnostics(self) -> Mapping[str, Any]:
         """``doubtful_logs``, where there is one: which findings speak against its logs; ``surface_change``: by how much
         the newest of them differ from those before; ``unknown_velocity``: that the object's motion was not recorded;
-        ``cluster_kind``: what of the samples shares errors, "grasp" where there are several; ``scale_between_grasps``:
+        ``cluster_kind``: what of the samples shares errors, "grasp" where there are several, "merged" where these came
+        as one set of moments; ``scale_between_grasps``:
         by how much they are thought to differ, of methods that allow for it.
         """
 

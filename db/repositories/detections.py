@@ -142,6 +142,7 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
             SampleSummaryRow.moments,
             DetectionRow.findings,
             DetectionRow.fingerprint,
+            DetectionRow.signature.is_not(None).label("has_signature"),
             SensorRow.name.label("sensor"),
             GraspLogRow.created_at,
             GraspLogRow.number,
@@ -154,8 +155,9 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
 
 
 def _samples_of_log(row: Row[Any], copies: tuple[str, ...] = ()) -> SamplesOfLog:
-    findings = None if row.findings is None else tuple(finding["name"] for finding in row.findings)
-    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor, copies)
+    findings = tuple(finding["name"] for finding in row.findings or ())
+    is_checked = row.findings is not None and row.has_signature
+    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor, copies, is_checked)
 
 
 def set_moments(session: Session, log_id: str, moments: bytes) -> None:

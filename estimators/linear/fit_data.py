@@ -30,8 +30,9 @@ class FitData:
     """Data behind a fit: ``factor`` of (v, f_n, μ) whose weight is the effective number of samples.
 
     ``clusters``: how many groups of samples share errors, of ``cluster_kind``; ``observations``: the samples, or None
-    where only moments are known; ``blocks``: the moments, one a grasp, where they came so. ``unknown`` [3]: sums over
-    the samples of unknown velocity, for which v counts as 0, of their weights times (1, v, f_n).
+    where only moments are known; ``blocks``: the moments, one a grasp, where they came so, and of the kind "merged"
+    where those of several grasps came as one, which no longer tell how grasps differ. ``unknown`` [3]: sums over the
+    samples of unknown velocity, for which v counts as 0, of their weights times (1, v, f_n).
     """
 
     factor: Factor

@@ -103,10 +103,10 @@ def corrected(session: Session, log: "GraspLog", sensor: str, version: int | Non
 
 
 def correction_findings(correction: Correction, uploaded_by: str | None) -> "list[Finding]":
-    """That a log is corrected by a calibration which another key stored than sent the log."""
+    """That a calibration which another key stored than sent the log changed something in it."""
     from slipcore import Finding
 
-    if correction.by is None or correction.by == uploaded_by:
+    if not correction.changed or correction.by is None or correction.by == uploaded_by:
         return []
     evidence = f"version {correction.version} of the sensor's calibration, stored by key {correction.by}, corrects it"
     return [Finding(CORRECTED_BY_ANOTHER, evidence, "see what it changed; send logs under a sensor's name of your own")]

@@ -15,29 +15,30 @@ if TYPE_CHECKING:
 def with_doubts(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
     """The model with ``doubtful_logs`` among its diagnostics where ``findings``, names for each of its logs, ask it."""
     doubts = [AGAINST_FRICTION.intersection(names) for names in findings]
-    doubtful = sum(map(bool, doubts))
-    if not doubtful:
-        return model
-    logs = "log is" if len(doubts) == 1 else "logs is" if doubtful == 1 else "logs are"
-    told = f"{doubtful} of {len(doubts)} {logs} doubtful ({', '.join(sorted(set().union(*doubts)))})"
-    return replace(model, diagnostics={**model.diagnostics, "doubtful_logs": told})
+    named = ", ".join(sorted(set().union(*doubts)))
+    return _counted(model, "doubtful_logs", [bool(names) for names in doubts], "is", "are", f"doubtful ({named})")
 
 
 def with_others_calibrations(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
     """The model with a note among its diagnostics where calibrations by another key than sent them correct logs."""
-    count = sum(CORRECTED_BY_ANOTHER in names for names in findings)
+    by_others = [CORRECTED_BY_ANOTHER in names for names in findings]
+    told = "corrected by a sensor's calibration that another key stored"
+    return _counted(model, OTHERS_CALIBRATIONS, by_others, "is", "are", told)
+
+
+def with_unchecked(model: "FrictionModel", checked: Sequence[bool]) -> "FrictionModel":
+    """The model with a note among its diagnostics where an older version did not look at some logs as this one does."""
+    told = "stored before logs were checked: what is sent again is looked at"
+    return _counted(model, UNCHECKED, [not each for each in checked], "was", "were", told)
+
+
+def _counted(
+    model: "FrictionModel", name: str, logs: Sequence[bool], one: str, several: str, told: str
+) -> "FrictionModel":
+    """The model with a diagnostic of this name that says of how many of its logs something is so, where of any."""
+    count = sum(logs)
     if not count:
         return model
-    are = "log is" if len(findings) == 1 else "logs is" if count == 1 else "logs are"
-    told = f"{count} of {len(findings)} {are} corrected by a sensor's calibration that another key stored"
-    return replace(model, diagnostics={**model.diagnostics, OTHERS_CALIBRATIONS: told})
-
-
-def with_unchecked(model: "FrictionModel", findings: Sequence[Collection[str] | None]) -> "FrictionModel":
-    """The model with a note among its diagnostics where an older version did not look for ``findings`` of some logs."""
-    unchecked = sum(each is None for each in findings)
-    if not unchecked:
-        return model
-    were = "log was" if len(findings) == 1 else "logs was" if unchecked == 1 else "logs were"
-    told = f"{unchecked} of {len(findings)} {were} stored before logs were checked: what is sent again is looked at"
-    return replace(model, diagnostics={**model.diagnostics, UNCHECKED: told})
+    verb = one if count == 1 else several
+    sentence = f"{count} of {len(logs)} {'log' if len(logs) == 1 else 'logs'} {verb} {told}"
+    return replace(model, diagnostics={**model.diagnostics, name: sentence})

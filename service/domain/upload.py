@@ -22,6 +22,7 @@ from service.domain.errors import (
     InsufficientScope,
     InvalidGraspLog,
     InvalidValue,
+    NotOwner,
     ResultsNotReady,
     UnsupportedFormat,
 )
@@ -200,7 +201,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         log_id, is_new = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), False
         known = grasp_logs.get(session, log_id)
         is_others = received.names_sensor and known.sensor != sensor
-        is_outdated = not is_others and _is_calibrated_anew(session, known)
+        is_outdated = not is_others and _is_calibrated_anew(session, known, material_id, principal)
         if not (is_others or is_outdated or _may_differ(session, known)):
             return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
@@ -214,8 +215,10 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         if is_others or is_outdated or not _can_go_on(session, known):
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
+        told["calibration_before"] = known.calibration
     stored = grasp_logs.get(session, log_id)
     told |= {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
+    told["calibration"] = stored.calibration
     audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
     return StoredUpload(stored, is_new)
 
@@ -234,14 +237,20 @@ def _change_sensor(
 
     Raises ``InsufficientScope`` and ``NotOwner``, and ``ResultsNotReady`` while its job goes by the sensor before.
     """
-    if log.uploaded_by != principal.key_id:
-        if material_id is not None:
-            check_may_change(session, material_id, principal)
-        elif not principal.is_admin:
-            raise InsufficientScope("upload", "admin")
+    _check_may_change_log(session, log, material_id, principal)
     if jobs.hold(session, log.job.id) == "running":
         raise ResultsNotReady(log.job.id, "running")
     grasp_logs.change_sensor(session, log.id, sensor)
+
+
+def _check_may_change_log(session: Session, log: StoredGraspLog, material_id: int | None, principal: Principal) -> None:
+    """Whether somebody sent this log or may change its material; raises ``InsufficientScope`` and ``NotOwner``."""
+    if log.uploaded_by == principal.key_id:
+        return
+    if material_id is not None:
+        check_may_change(session, material_id, principal)
+    elif not principal.is_admin:
+        raise InsufficientScope("upload", "admin")
 
 
 def _can_go_on(session: Session, log: StoredGraspLog) -> bool:
@@ -266,10 +275,16 @@ def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     return by_gel and job.finished_at is not None and _gel(session, log) != (None if found is None else found.gel)
 
 
-def _is_calibrated_anew(session: Session, log: StoredGraspLog) -> bool:
-    """Whether its job has ended, and its sensor was calibrated since it was sent."""
+def _is_calibrated_anew(session: Session, log: StoredGraspLog, material_id: int | None, principal: Principal) -> bool:
+    """Whether its job has ended, and its sensor was calibrated since it was sent: for who may change it."""
     is_newer = stored_sensors.get(session, log.sensor).calibration != log.calibration
-    return is_newer and log.job.finished_at is not None
+    if not is_newer or log.job.finished_at is None:
+        return False
+    try:
+        _check_may_change_log(session, log, material_id, principal)
+    except (InsufficientScope, NotOwner):  # what they send again says nothing against the log as it is
+        return False
+    return True
 
 
 def _is_unchecked(session: Session, log_id: str, found: Detection) -> bool:

@@ -299,9 +299,8 @@ def _fit_by(
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
     findings = [part.findings for part in parts]
-    told = [each or () for each in findings]
-    model = with_unchecked(with_others_calibrations(with_doubts(model, told), told), findings)
-    return with_copies(model, parts)
+    model = with_others_calibrations(with_doubts(model, findings), findings)
+    return with_copies(with_unchecked(model, [part.is_checked for part in parts]), parts)
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:

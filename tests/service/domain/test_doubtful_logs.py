@@ -50,10 +50,10 @@ def test_logs_that_others_calibrations_correct_are_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("findings", "told"),
-    [([None], "1 of 1 log was"), ([None, ()], "1 of 2 logs was"), ([None, None, ["saturation"]], "2 of 3 logs were")],
+    ("checked", "told"),
+    [([False], "1 of 1 log was"), ([False, True], "1 of 2 logs was"), ([False, False, True], "2 of 3 logs were")],
 )
-def test_logs_that_were_not_checked_are_counted(findings: list[list[str] | None], told: str) -> None:
-    (note,) = notes(with_unchecked(MODEL, findings).diagnostics)
+def test_logs_that_were_not_checked_are_counted(checked: list[bool], told: str) -> None:
+    (note,) = notes(with_unchecked(MODEL, checked).diagnostics)
     assert note == f"{told} stored before logs were checked: what is sent again is looked at"
-    assert with_unchecked(MODEL, [["saturation"], ()]) is MODEL
+    assert with_unchecked(MODEL, [True, True]) is MODEL

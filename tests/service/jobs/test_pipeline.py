@@ -265,10 +265,11 @@ def test_logs_are_compared_while_others_may_write(
     assert told.findings[0].name == "same grasp"
 
 
-def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes) -> None:
+@pytest.mark.parametrize("missing", ["findings", "signature"])
+def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes, missing: str) -> None:
     shop.run(shop.ingest(content)[1])
     with shop.database.write() as session:
-        session.execute(update(DetectionRow).values(findings=None))
+        session.execute(update(DetectionRow).values({missing: None}))
     shop.run(shop.ingest(another_grasp(content))[1])
     stored = hierarchical_model(shop)
     assert to_client_model(stored).notes == (stored.model.diagnostics["unchecked_logs"],)

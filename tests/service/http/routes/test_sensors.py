@@ -493,6 +493,25 @@ def test_what_another_key_calibrated_is_told_of_a_log_and_its_material(
     (found,) = correction_findings(correction, own)
     assert f"stored by key {other}" in found.evidence
     assert correction_findings(correction._replace(by=None), own) == []
+    assert correction_findings(correction._replace(changed=()), own) == []
+
+
+def test_another_keys_log_keeps_its_calibration(
+    reach: Callable[..., Any], make: Callable[..., str], database: Database, blobs: BlobStore, ball: GraspLog
+) -> None:
+    """Whoever sent it again had had it corrected anew. Its own key has, and the trail says by which."""
+    content = encode(FAULTS.put_into(ball, 2))
+    first, other = (lab_that_sends(reach, content, make("upload")) for _ in range(2))
+    first(sensor="kept").raise_for_status()
+    run_next(database, blobs)
+    model = calibrate_sensor([FAULTS.put_into(ball, 1)])
+    with database.write() as session:
+        calibrations.add(session, "kept", NewCalibration((), replace(model, offset=None).to_json(), None, None))
+    assert other().json()["job"]["status"] == "done"
+    assert first().json()["job"]["status"] == "queued"
+    entries = reach("open").get("/v1/audit?action=grasp_log.uploaded").json()["items"]
+    told = [(entry["details"].get("calibration_before", "new"), entry["details"]["calibration"]) for entry in entries]
+    assert told == [(None, 1), ("new", None)]
 
 
 def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database, ball: GraspLog) -> None:
