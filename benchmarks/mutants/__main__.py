@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
-    drawn = sample.draw(copy.root, options.count, options.seed)
+    drawn = sample.draw(copy.root, options.count, options.seed, options.packages)
     path = _verdicts(options)
     found = verdicts.known(path)
     waiting = [edit for edit in drawn if edit.key not in found or (options.again and not found[edit.key].is_killed)]
@@ -85,6 +85,7 @@ def _options() -> argparse.Namespace:
     parser = page_options(__doc__)
     parser.add_argument("--count", type=int, default=320, help="how many mutants are drawn, at least")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--packages", nargs="+", default=sample.PACKAGES, choices=sample.PACKAGES, help="drawn from")
     parser.add_argument("--seconds", type=float, default=math.inf, help="no mutant is begun after so many")
     parser.add_argument("--part", default="1/1", metavar="K/N", help="every N-th of those that wait, from the K-th on")
     parser.add_argument("--work", type=Path, default=ROOT / ".cache" / "mutants", help="the copy and all verdicts")
@@ -120,7 +121,7 @@ def _line(edit: Edit, verdict: Verdict) -> str:
 
 def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], options: argparse.Namespace) -> None:
     reasons = tomllib.loads(EXPLAINED.read_text())
-    lines = sample.lines_of(copy.root)
+    lines = sample.lines_of(copy.root, options.packages)
     made = tables(drawn, found, reasons, lines)
     if options.sample:
         first = verdicts.known(_verdicts(options), at_first_sight=True)

@@ -213,6 +213,7 @@ def test_packages_have_their_share_and_a_seed_draws_the_same(copy: ScratchCopy) 
     assert drawn != sample.draw(copy.root, 4, seed=2)
     more = sample.draw(copy.root, 8, seed=1)
     assert set(drawn) < set(more)
+    assert sample.draw(copy.root, 4, seed=1, packages=["slipcore"]) == drawn
 
 
 def test_tests_reach_a_line_directly_or_through_what_uses_it(copy: ScratchCopy) -> None:
