@@ -49,22 +49,34 @@ UNCHECKED = "unchecked_logs"
 REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
 
 
-def fill(database: Database, log: NewGraspLog, detection: Detection, samples: SampleSummary, model: NewModel) -> None:
-    """A row in every table."""
-    with database.write() as session:
-        material = materials.create(session, "paper", "")
-        session.add(MaterialOwnerRow(material_id=material.id, owner="group:lab"))
-        log_id = grasp_logs.add(session, log)
-        job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
-        detections.add(session, log_id, detection, samples)
-        friction_models.add(session, material.id, job, model)
-        calibrations.add(session, log.sensor, NewCalibration((CalibrationPress(log_id, 2.0),), {}, b"", None))
-        stores.set_id(session, "0" * 32)
-        idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
-        access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
-        browser_sessions.add(session, log.sha256, "0" * 12, now() + timedelta(hours=1))
-        audit.add(session, audit.SERVICE, "material.created", "paper")
-        assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
+@pytest.fixture
+def fill(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+) -> Callable[[], None]:
+    """Store a row in every table."""
+
+    def add() -> None:
+        log = new_log(material_id=1)
+        with database.write() as session:
+            material = materials.create(session, "paper", "")
+            session.add(MaterialOwnerRow(material_id=material.id, owner="group:lab"))
+            log_id = grasp_logs.add(session, log)
+            job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
+            detections.add(session, log_id, detection, samples)
+            friction_models.add(session, material.id, job, new_model())
+            calibrations.add(session, log.sensor, NewCalibration((CalibrationPress(log_id, 2.0),), {}, b"", None))
+            stores.set_id(session, "0" * 32)
+            idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
+            access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
+            browser_sessions.add(session, log.sha256, "0" * 12, now() + timedelta(hours=1))
+            audit.add(session, audit.SERVICE, "material.created", "paper")
+            assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
+
+    return add
 
 
 def unmarked(stored: StoredModel) -> StoredModel:
@@ -130,12 +142,9 @@ def test_every_migration_goes_up_and_down_and_up(empty_database: Database) -> No
 
 def test_migrations_go_down_and_up_with_data_in_every_table(
     database: Database,
-    new_log: Callable[..., NewGraspLog],
-    detection: Detection,
-    samples: SampleSummary,
-    new_model: Callable[..., NewModel],
+    fill: Callable[[], None],
 ) -> None:
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     with database.read() as session:
         counts = {name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar() for name in tables(database)}
     assert set(counts.values()) == {1}
@@ -143,7 +152,7 @@ def test_migrations_go_down_and_up_with_data_in_every_table(
         migrate.downgrade(database, "-1", lose=True)
     assert tables(database) == set()
     migrate.upgrade(database)
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     migrate.check(database)
 
 
@@ -166,12 +175,9 @@ def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_
 
 def test_a_database_of_before_claims_keeps_its_jobs_and_models(
     database: Database,
-    new_log: Callable[..., NewGraspLog],
-    detection: Detection,
-    samples: SampleSummary,
-    new_model: Callable[..., NewModel],
+    fill: Callable[[], None],
 ) -> None:
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     with database.write() as session:
         material = materials.find_id(session, "paper")
         unwanted = jobs.add(session, "fit", "ols", material_id=material)
@@ -196,9 +202,7 @@ def test_a_database_of_before_claims_keeps_its_jobs_and_models(
 
 def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell(
     database: Database,
-    new_log: Callable[..., NewGraspLog],
-    detection: Detection,
-    samples: SampleSummary,
+    fill: Callable[[], None],
     new_model: Callable[..., NewModel],
     scales: Scales,
 ) -> None:
@@ -206,7 +210,7 @@ def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell
     for name in ("between_grasps", "between_places", "within"):  # that between sensors was not there yet
         scale = asdict(scales)[name]
         told |= {f"scale_{name}": scale["value"], f"scale_{name}_degrees_of_freedom": scale["degrees_of_freedom"]}
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     with database.write() as session:
         job = jobs.add(session, "fit", "hierarchical", material_id=1)
         structured = replace(new_model("hierarchical", scales=scales), diagnostics=told)
@@ -262,12 +266,10 @@ def test_logs_of_before_are_numbered_by_time(database: Database, new_log: Callab
 
 def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
     database: Database,
-    new_log: Callable[..., NewGraspLog],
-    detection: Detection,
-    samples: SampleSummary,
+    fill: Callable[[], None],
     new_model: Callable[..., NewModel],
 ) -> None:
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     with database.write() as session:
         ingest = jobs.list_all(session, Window("created_at"))[0]
         friction_models.add(session, 1, ingest.id, new_model("hierarchical"))
@@ -422,14 +424,11 @@ def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callabl
 )
 def test_what_the_way_back_would_lose_is_named_and_kept(
     database: Database,
-    new_log: Callable[..., NewGraspLog],
-    detection: Detection,
-    samples: SampleSummary,
-    new_model: Callable[..., NewModel],
+    fill: Callable[[], None],
     revision: str,
     told: str,
 ) -> None:
-    fill(database, new_log(material_id=1), detection, samples, new_model())
+    fill()
     found = [{"name": "zero offset", "evidence": "", "remedy": ""}]
     with database.write() as session:
         session.execute(update(DetectionRow).values(findings=found, fingerprint="1" * 64, signature=b"f"))
