@@ -1,5 +1,3 @@
-from collections.abc import Callable
-from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +10,9 @@ from service.jobs.campaign import RequestedAccuracy
 from service.processes import spawned
 from slipcore.contact import Scene
 from slipcore.errors import InvalidInput
+from tests.executors import Here
 
 QUICK = RequestedAccuracy()
-
-
-class Here(Executor):
-    """Does what it is told at once, and remembers the seeds."""
-
-    def __init__(self) -> None:
-        self.seeds: list[int] = []
-
-    def submit(self, do: Callable[..., Any], /, *given: Any, **options: Any) -> Future[Any]:
-        self.seeds.append(options["seed"])
-        done: Future[Any] = Future()
-        try:
-            done.set_result(do(*given, **options))
-        except Exception as error:
-            done.set_exception(error)
-        return done
 
 
 def scene(name: str = "A press", friction: float = 0.4, **more: Any) -> Scene:
@@ -56,7 +39,7 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     (tmp_path / "a_press-1.npz").unlink()
     again = Here()
     made = list(campaign.run(again, [scene()], range(3), tmp_path, QUICK))
-    assert again.seeds == [1, 2]
+    assert [options["seed"] for options in again.options] == [1, 2]
     assert sorted(outcome.seed for outcome in made) == [0, 1, 2]
 
 

@@ -4,7 +4,7 @@ import json
 import shutil
 import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import version
@@ -35,22 +35,11 @@ from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.errors import InvalidInput
 from slipcore.frames import FrictionLaw
 from stiction_client import container
+from tests.executors import Here
 
 PILLARS = kinds_named(["pillars 3x3"])
 PHRASE = "a grey heron"
 SHAPE = (4, 1, 2)
-
-
-class Here(Executor):
-    """Does what it is told at once."""
-
-    def submit(self, do: Callable[..., Any], /, *given: Any, **options: Any) -> Future[Any]:
-        done: Future[Any] = Future()
-        try:
-            done.set_result(do(*given, **options))
-        except Exception as error:
-            done.set_exception(error)
-        return done
 
 
 @pytest.fixture(scope="module")
