@@ -54,6 +54,14 @@ def raising(*_: object) -> None:
     raise Died
 
 
+def die_before_the_row(database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first start that has named the files' store, and not yet the database's."""
+    with monkeypatch.context() as dying:
+        dying.setattr(stores, "set_id", raising)
+        with pytest.raises(Died):
+            join(database, blobs)
+
+
 def nothing(what: str, count: int) -> None:
     pass
 
@@ -128,10 +136,7 @@ def test_a_first_start_that_died_before_its_row_begins_anew(
     database: Database, blobs: BlobStore, other: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But not while others work in the folder: one of them may be about to write its row."""
-    with monkeypatch.context() as dying:
-        dying.setattr(stores, "set_id", raising)
-        with pytest.raises(Died):
-            join(database, blobs)
+    die_before_the_row(database, blobs, monkeypatch)
     with pytest.raises(StoreMismatch, match=r"of no store yet, and .* of store"):
         identity.join(other, blobs, alone=False)
     join(other, blobs)
@@ -143,10 +148,7 @@ def test_a_first_start_that_died_before_its_row_begins_anew(
 def test_files_of_a_first_start_that_died_can_be_filled_while_there_are_none(
     database: Database, blobs: BlobStore, other: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with monkeypatch.context() as dying:
-        dying.setattr(stores, "set_id", raising)
-        with pytest.raises(Died):
-            join(database, blobs)
+    die_before_the_row(database, blobs, monkeypatch)
     identity.check_to_fill(other, blobs)
     blobs.put(b"somebody's")
     with pytest.raises(StoreMismatch):
