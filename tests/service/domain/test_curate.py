@@ -114,6 +114,18 @@ def shop(database: Database, blobs: BlobStore, content: bytes) -> Shop:
     return Shop(database, blobs, [another_grasp(content, number) for number in range(3)])
 
 
+def test_only_what_differs_is_changed_and_recorded(database: Database, blobs: BlobStore) -> None:
+    context, window = Shop(database, blobs, []).context, Window("id")
+    with database.write() as session:
+        materials.create(session, "paper", "white")
+    for name, description in ((None, None), ("paper", "white"), ("paper", "grey"), ("card", "grey")):
+        changed = curate.change(context, "paper", name, description)
+        assert (changed.name, changed.description) == (name or "paper", description or "white")
+    with database.read() as session:
+        told = [entry.details for entry in audit.list_all(session, window, AuditFilter(action="material.changed"))]
+    assert told == [{"name": None, "description": "grey"}, {"name": "card", "description": None}]
+
+
 def test_after_an_upload_cheap_models_are_fitted_again_and_costly_ones_are_outdated(shop: Shop) -> None:
     shop.ingest("paper", 0)
     one = shop.model("paper")[1]

@@ -43,6 +43,16 @@ def test_calls_are_answered_in_their_order_with_results_or_errors() -> None:
     with_process(body)
 
 
+def test_an_interrupt_meant_for_the_server_ends_no_call() -> None:
+    async def body(process: SideProcess) -> None:
+        process_id = await process.call(os.getpid)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            os.kill(process_id, number)
+            assert await process.call(os.getpid) == process_id
+
+    with_process(body)
+
+
 def test_who_waits_no_longer_takes_nobody_elses_answer() -> None:
     async def body(process: SideProcess) -> None:
         first, second = (asyncio.create_task(process.call(len, "x" * k)) for k in (1, 2))

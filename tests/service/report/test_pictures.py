@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 from service.report.pictures import (
     MOST_SAMPLES,
     SNAPSHOTS,
+    SlipOverTime,
+    draw_slip,
     friction_sections,
     marginals,
     slip_over_time,
@@ -139,3 +141,12 @@ def test_marginals_are_densities_with_the_truth_where_it_has_a_value() -> None:
         x, y = one.collections[0].get_paths()[0].vertices.T
         upper = (y > 0.0) & (np.append(np.diff(x), 0.0) > 0.0)
         assert np.trapezoid(y[upper], x[upper]) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("points", "size"), [(8, 75.0), (20, 12.0), (40, 3.0)])
+def test_marks_of_a_map_shrink_with_the_distance_of_the_elements(points: int, size: float) -> None:
+    place = np.stack(np.mgrid[:points, :points], axis=-1) * 16e-3 / points
+    none = np.zeros((3, points, points), bool)
+    figure = draw_slip(SlipOverTime(np.arange(3.0), place, none, none, np.ones(3), "nobody"))
+    (marks,) = {float(each) for axes in figure.axes for part in axes.collections for each in part.get_sizes()}
+    assert marks == pytest.approx(size)
