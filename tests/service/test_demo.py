@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import pytest
 
 from service.cli.output import print_table
-from service.demo import server, tables
+from service.demo import run, server, tables
 from service.demo.inputs import FRICTION
 from service.report.page import Table
+from stiction_client import NoFeasibleForce, required_normal_force
+from tests.service.report.test_material import MODEL
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT / ".cache" / "tac3d" / "PyTac3D" / "example_data"
@@ -33,6 +36,15 @@ def test_a_reason_stands_in_lines_of_words_within_100_columns(kind: str, capsys:
     assert max(map(len, printed.splitlines())) <= 100
     assert "samples tell too little: 12 samples in 1" in printed
     assert "refused" in printed
+
+
+def test_the_planner_answers_or_says_why_no_force_holds() -> None:
+    asked = {"slip_probability": 1e-3, "contact_area": 6e-5}
+    certain = replace(MODEL, scale=1e-3, covariance=1e-4 * MODEL.covariance)
+    assert run._grip(certain) == required_normal_force(certain, 1.5, **asked)
+    refused = run._grip(replace(certain, coefficients=-MODEL.coefficients))
+    assert isinstance(refused, NoFeasibleForce)
+    assert tables.grips([tables.Answer("paper", "ols", None, certain, refused)]).rows[0][2:] == ["none", str(refused)]  # type: ignore[arg-type]
 
 
 def test_jobs_that_end_well_have_no_table_of_reasons() -> None:
