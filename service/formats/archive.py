@@ -125,7 +125,8 @@ def _check_directory(path: Path) -> None:
     """Bound the table of contents before ``zipfile`` turns each of its entries into an object.
 
     What stands before the first member, which ``zipfile`` passes over, is refused: to others the file is no zip. So is
-    what stands behind the end, and of two zips in one file the first, of which nothing would be read.
+    what stands behind the end but for zeros, with which some writers fill a block, and of two zips in one file the
+    first, of which nothing would be read.
     """
     with path.open("rb") as stream:
         start, length = stream.read(len(_MEMBER)), stream.seek(0, 2)
@@ -141,7 +142,7 @@ def _check_directory(path: Path) -> None:
     if zip64 or size > MAX_DIRECTORY_BYTES:
         value = "in the zip64 layout" if zip64 else f"{size} bytes"
         raise InvalidInput("table of contents", value, f"at most {MAX_DIRECTORY_BYTES} bytes, no zip64")
-    behind, before = len(tail) - (end + _END_BYTES + comment), length - len(tail) + end - (offset + size)
+    behind, before = len(tail[end + _END_BYTES + comment :].rstrip(b"\0")), length - len(tail) + end - (offset + size)
     if behind > 0:
         raise InvalidInput("file", f"a zip with {behind} other bytes behind it", "nothing behind a zip")
     if before > 0:
