@@ -211,10 +211,9 @@ def test_exchanged_axes_go_with_the_markers_as_in_a_mirror() -> None:
     assert found == "forces go with the markers as in a mirror: two axes are exchanged, or one is reversed"
 
 
-def test_the_direction_of_normals_is_that_of_their_mean() -> None:
-    normal = np.array([[[[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8]]], [[[0.6, 0.0, 0.8], [0.0, 0.6, 0.8]]]])
-    expected = [[0.0, 0.0, 1.0], np.array([0.3, 0.3, 0.8]) / np.sqrt(0.82)]
-    np.testing.assert_allclose(forces._direction(normal), expected, rtol=0, atol=1e-15)
+def test_a_direction_is_a_vector_over_its_length_and_nothing_stays_nothing() -> None:
+    found = forces._unit(np.array([[0.3, 0.0, 0.4], [0.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(found, [[0.6, 0.0, 0.8], [0.0, 0.0, 0.0]], rtol=1e-15)
 
 
 def test_what_elements_read_alike_is_freed_of_what_they_differ_by_and_of_noise() -> None:
