@@ -93,7 +93,7 @@ class Settings(BaseSettings):
         default=1000.0, description="Requests a second of one key, or of one address without a key; 0: any number."
     )
     max_connections: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        default=1000, description="Connections at once; further requests are answered 503."
+        default=1000, description="Connections at once; beyond that idle ones are closed."
     )
     max_connections_per_address: Annotated[int, Field(ge=1, le=100_000)] = Field(
         default=200, description="Connections of one address; beyond that its idle ones are closed."

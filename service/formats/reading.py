@@ -46,6 +46,9 @@ of its file."""
 WATCH_SECONDS = 0.1
 """s between two looks at what a file has taken."""
 
+START_SECONDS = 60.0
+"""s by the clock in which a process has to answer, before it is given a file: imports take it 1 s of CPU."""
+
 IDLE_SECONDS = 60.0
 """s that a process without work is kept."""
 
@@ -234,10 +237,11 @@ def _cpu_seconds(process_id: int | None) -> float:
 
 
 async def _runs(executor: ProcessPoolExecutor) -> bool:
-    """Whether the process answers, once it has started."""
+    """Whether the process answers, once it has started; one that does not is ended."""
     try:
-        await asyncio.get_running_loop().run_in_executor(executor, os.getpid)
-    except BrokenProcessPool:
+        async with asyncio.timeout(START_SECONDS):
+            await asyncio.get_running_loop().run_in_executor(executor, os.getpid)
+    except (BrokenProcessPool, TimeoutError):
         _end(executor)
         return False
     except BaseException:

@@ -1,12 +1,14 @@
 """HTTP connections that cannot be kept waiting, whichever parser reads them.
 
 Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. Who sends much
-waits for the others (``service.http.turns``). No address may hold all connections, who sends requests without waiting
-for answers is read no faster than he is answered, and a request that two parsers could read differently is refused.
+waits for the others (``service.http.turns``). No address may hold all connections, and those that ask nothing make
+room for others. Who sends requests without waiting for answers is read no faster than he is answered, and a request
+that two parsers could read differently is refused.
 """
 
 import asyncio
 import json
+from collections import Counter
 from http import HTTPStatus
 from time import perf_counter
 from typing import Any
@@ -72,7 +74,8 @@ class _HoldingFlow(FlowControl):
 class BoundedConnection(asyncio.Protocol):
     """What is added to either of the server's own protocols: its bounds, and its refusals as problem details.
 
-    An address may have ``per_address`` connections; beyond that the one that was idle for longest makes room.
+    An address may have ``per_address`` connections, and all together ``limit_concurrency``; beyond that the one makes
+    room that was idle for longest, in all of the address that has most.
     """
 
     transport: asyncio.Transport
@@ -239,21 +242,35 @@ class BoundedConnection(asyncio.Protocol):
         return self.cycle.more_body and not self.cycle.response_started
 
     def _make_room(self) -> None:
-        """Close another connection of an address that has too many, or else refuse what comes on this one."""
-        if self._per_address is None or self.client is None:
-            return
-        same = [each for each in self.connections if each.client and each.client[0] == self.client[0]]
-        held = [each for each in same if not each.transport.is_closing() or _has_unsent(each)]
-        if len(held) <= self._per_address:
-            return
+        """Close another connection where there are too many, of this address or in all, or else refuse what comes on
+        this one.
+        """
+        held = [each for each in self.connections if not each.transport.is_closing() or _has_unsent(each)]
+        same = [each for each in held if _address(each) == _address(self)]
+        if self._per_address is not None and self.client is not None and len(same) > self._per_address:
+            self._is_beyond = not self._close_one(same)
+        elif self._most is not None and len(held) > self._most:
+            self._close_one(held)
+
+    def _close_one(self, held: list[Any]) -> bool:
+        """Close the longest idle of the address that has most; returns whether one of these is idle."""
         unneeded = [each for each in held if each is not self and _is_unneeded(each)]
-        self._is_beyond = not unneeded
-        if unneeded:
-            least = min(unneeded, key=lambda each: (not each.transport.is_closing(), getattr(each, "idle_since", 0.0)))
-            if _has_unsent(least):
-                least.transport.abort()
-            else:
-                least.transport.close()
+        if not unneeded:
+            return False
+        counts = Counter(map(_address, held))
+        least = min(
+            unneeded,
+            key=lambda each: (
+                not each.transport.is_closing(),
+                -counts[_address(each)],
+                getattr(each, "idle_since", 0.0),
+            ),
+        )
+        if _has_unsent(least):
+            least.transport.abort()
+        else:
+            least.transport.close()
+        return True
 
     def _wait_for_headers(self) -> None:
         self._header_timer = self.loop.call_later(HEADER_SECONDS, self.transport.close)
@@ -288,6 +305,11 @@ class BoundedConnection(asyncio.Protocol):
         if _length_of_offer(self.headers) > OFFER_BYTES:
             return None
         return super()._get_upgrade()  # type: ignore[misc]  # of the server's protocol
+
+
+def _address(connection: Any) -> str | None:
+    """Where a connection comes from; None by a socket in the file system."""
+    return None if connection.client is None else str(connection.client[0])
 
 
 def _has_unsent(connection: Any) -> bool:

@@ -157,7 +157,7 @@ MEANINGS: dict[str, ProblemMeaning] = {
         "Its log has the traceback.",
     ),
     "too-many-connections": ProblemMeaning(
-        "`STICTION_MAX_CONNECTIONS` are open already.",
+        "`STICTION_MAX_CONNECTIONS` are busy already, or those of one address.",
         "Try again after `Retry-After` seconds, and keep connections open in place of making new ones.",
     ),
     "too-many-uploads": ProblemMeaning(

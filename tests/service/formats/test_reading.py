@@ -1,5 +1,6 @@
 import asyncio
 import os
+import signal
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -139,6 +140,29 @@ def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(
         return await readers.convert(source, target, "parquet", {})
 
     assert with_readers(60.0, lose_between).frames == len(ramp)
+
+
+def test_a_reader_that_hangs_between_two_files_does_not_keep_the_second(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    parquet.write(ramp, source)
+
+    async def stop_between(readers: Readers) -> Any:
+        await readers.convert(source, target, "parquet", {})
+        (hung,) = running(executors)
+        os.kill(hung.pid, signal.SIGSTOP)
+        with monkeypatch.context() as patched:
+            patched.setattr(reading, "START_SECONDS", 0.2)
+            chosen = readers._choose("")
+            assert chosen is not None
+            readers._idle.pop(chosen).timer.cancel()
+            assert not await reading._runs(chosen)
+        hung.join()
+        return await readers.convert(source, target, "parquet", {}), hung.exitcode
+
+    description, ended_by = with_readers(60.0, stop_between)
+    assert (description.frames, ended_by) == (len(ramp), -signal.SIGKILL)
 
 
 def test_a_file_that_is_late_by_the_clock_alone_is_to_come_again(

@@ -3,6 +3,7 @@
 import asyncio
 import gc
 import json
+import select
 import socket
 import threading
 import time
@@ -26,7 +27,7 @@ MOST, MOST_OF_ONE = 60, 100
 LARGE = bytes(2**25)
 """More than the system keeps of what a client does not read."""
 
-Connect = Callable[[], socket.socket]
+Connect = Callable[..., socket.socket]
 
 
 async def hello(scope: Scope, receive: Receive, send: Send) -> None:
@@ -80,8 +81,9 @@ def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection], 
         time.sleep(0.005)
     opened: list[socket.socket] = []
 
-    def open_one() -> socket.socket:
-        opened.append(socket.create_connection(server.servers[0].sockets[0].getsockname(), timeout=10.0))
+    def open_one(source: str = "127.0.0.1") -> socket.socket:
+        address = server.servers[0].sockets[0].getsockname()
+        opened.append(socket.create_connection(address, timeout=10.0, source_address=(source, 0)))
         return opened[-1]
 
     yield open_one
@@ -204,8 +206,15 @@ def test_a_socket_is_read_in_large_pieces(connect: Connect, monkeypatch: pytest.
     assert sizes == [connections.RECEIVED_BYTES]
 
 
-def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connect) -> None:
+UNENDED = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\nx"
+"""A request that stops within its body."""
+
+
+def test_whoever_comes_when_all_connections_are_busy_is_told_so(connect: Connect) -> None:
     others = [connect() for _ in range(MOST)]
+    for other in others:
+        other.sendall(UNENDED)
+    time.sleep(TIMEOUT)
     connection = connect()
     connection.sendall(b"GET /hello HTTP/1.1\r\nHost: a\r\n\r\n")
     head, _, body = rest(connection).partition(b"\r\n\r\n")
@@ -218,6 +227,20 @@ def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connec
     again = connect()
     again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(again).endswith(b"hello")
+
+
+def test_connections_that_ask_nothing_make_room_for_others(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the address that has most, so that no more files are open than were counted with."""
+    monkeypatch.setattr(connections, "HEADER_SECONDS", 60.0)
+    of_another = connect("127.0.0.2")
+    silent = [connect() for _ in range(MOST + 20)]
+    asking = connect()
+    asking.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(asking).endswith(b"hello")
+    ended, _, _ = select.select(silent, [], [], 0.0)
+    assert len(ended) == len(silent) + 2 - MOST
+    of_another.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(of_another).endswith(b"hello")
 
 
 @pytest.mark.parametrize("most_of_one", [2])

@@ -14,6 +14,7 @@ import pytest
 
 from db.database import Database
 from db.errors import StorageUnavailable
+from db.records import SeenClock
 from db.repositories import audit, stores
 from db.tables import AuditEntryRow, now
 from service.jobs import webhook
@@ -183,6 +184,14 @@ def test_an_entry_too_old_does_not_stop_what_follows(
     assert sender.send_new() == 1
     assert [each["subject"] for each in receiver.told] == ["felt"]
     assert "entry 1 of the audit trail is too old to be sent" in caplog.text
+
+
+def test_nothing_is_given_up_by_a_clock_that_may_be_wrong(stored: Database, receiver: Receiver) -> None:
+    sender = hook(stored, receiver)
+    found(stored, "paper", age=8 * 86400.0)
+    with stored.write() as session:
+        stores.note_clock(session, SeenClock(now() - timedelta(days=30), 1e6, 0))
+    assert sender.send_new() == 1
 
 
 def test_what_another_process_has_sent_meanwhile_is_not_sent_again(stored: Database, receiver: Receiver) -> None:
