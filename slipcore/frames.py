@@ -71,6 +71,9 @@ class GroundTruth:
 NONE = "none"
 """In a log's metadata, for what its sensor does not measure."""
 
+ALONG_NORMAL = "along the normal"
+"""There, for displacement of which only z was measured, as by height maps."""
+
 RECONSTRUCTED = "reconstructed"
 """There, for forces that follow from displacement."""
 
@@ -163,6 +166,11 @@ class GraspLog:
     def has_displacement(self) -> bool:
         """Whether displacement was measured; False where the metadata say that there are forces alone."""
         return self.metadata.get("displacement") != NONE
+
+    @property
+    def sees_along_surface(self) -> bool:
+        """Whether x and y of displacement were measured; False where the metadata say "along the normal"."""
+        return self.metadata.get("displacement") != ALONG_NORMAL
 
     @property
     def has_reconstructed_force(self) -> bool:

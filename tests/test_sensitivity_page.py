@@ -29,6 +29,7 @@ WHOLE_TABLES = {
 
 ENTRIES = {
     "slipcore.forces.RECONSTRUCTION": ("force_to_noise", "of friction samples, which presses do not give"),
+    "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),

@@ -8,13 +8,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from service.formats import rest
+from service.formats import height_maps, rest
 from service.formats.lattice import element_area, flat_lattice
 from service.formats.mapping import COMPONENTS, PRESSURE_ALONE, FieldMapping, Origin
-from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
+from service.formats.members import DTYPES, FLAG, FLOAT, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
-from slipcore.frames import NONE, BoolArray, FloatArray, GraspLog, check_mask
+from slipcore.frames import ALONG_NORMAL, NONE, BoolArray, FloatArray, GraspLog, check_mask
 
 MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 """Bytes of all that is read of one file: they are held twice while the log is made of them."""
@@ -63,18 +63,22 @@ def _log(
     if "force" in members and "displacement" not in members:
         members["displacement"] = np.zeros(members["force"].shape)
         metadata["displacement"] = NONE
-    for name in ("displacement", "time"):
-        _require(name, members, recording)
     for name in (*VECTORS, *MASKS):
         if name in members:
             members[name] = _on_grid(name, members[name], grid)
+    has_height = "height" in members
+    if has_height:
+        mapping = _from_heights(members, mapping, grid, metadata)
+    for name in ("displacement", "time"):
+        _require(name, members, recording)
     if "position" not in members and mapping.pitch is not None:
         members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
         metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
     if mapping.rest is not None or mapping.is_of_places:
         _from_rest(members, mapping, metadata)
     _require("position", members, recording)
-    unseen = len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys()
+    flat = not has_height and len(mapping.origins["displacement"].fields) == 2
+    unseen = flat and not {"force", "contact"} & members.keys()
     if unseen:
         metadata["contact"] = "estimated from motion"
     if "element_area" not in members:
@@ -88,6 +92,58 @@ def _log(
     from slipcore.markers import contact_by_motion  # loads scipy.spatial, which few files need
 
     return replace(log, contact=contact_by_motion(log.time, log.displacement))
+
+
+def _from_heights(
+    members: dict[str, NDArray[Any]], mapping: FieldMapping, grid: tuple[int, int] | None, metadata: dict[str, str]
+) -> FieldMapping:
+    """Displacement along z by maps of height; what remains of the mapping, with all else at rest in the same frame.
+
+    Elements are where the markers are, or divide the map. Without markers nothing is known along the surface.
+    """
+    height = height_maps.maps_of(members.pop("height"), mapping.pixels)
+    pixels = (height.shape[1], height.shape[2])
+    if mapping.pixel is None or mapping.pitch is not None:
+        raise InvalidInput("height", "with a pitch" if mapping.pitch else "without pixel", "pixel in the mapping, in m")
+    if isinstance(mapping.rest, rest.SensorAlone) or mapping.rest == rest.ALL_FRAMES:
+        raise InvalidInput("rest", "a file", "a frame: of maps of height no file of the sensor alone is read")
+    frame = height_maps.frame_at_rest(mapping.rest, height, members)
+    elements = _elements_of(members, mapping, frame, grid, pixels)
+    risen, seen = height_maps.rise(height, height[frame], elements.shares(pixels, mapping.pixel))
+    if not seen.any():
+        raise InvalidInput(
+            "height", f"of {pixels[0]} × {pixels[1]} pixels, none of an element", "maps over the elements"
+        )
+    shape = (len(height), *elements.position.shape[:2])
+    if "displacement" not in members:
+        members["displacement"], metadata["displacement"] = np.zeros((*shape, 3)), ALONG_NORMAL
+    moved = np.array(members["displacement"], dtype=np.float64)
+    if moved.shape != (*shape, 3) or moved[..., 2].any():
+        raise InvalidInput("displacement", f"of shape {list(moved.shape)}", f"{[*shape, 3]} beside height, with no z")
+    moved[..., 2] = risen.reshape(shape)
+    members["displacement"] = moved
+    told = members.get("observed", np.ones(shape, dtype=bool))
+    members["observed"] = check_mask("observed", told, shape) & seen.reshape(shape)
+    members.setdefault("position", elements.position)
+    members.setdefault("element_area", np.array(elements.area))
+    metadata["rest"] = f"frame {frame}"
+    is_counted = mapping.rest is not None or mapping.is_of_places
+    return mapping.at_rest(str(frame)) if is_counted else mapping
+
+
+def _elements_of(
+    members: Members, mapping: FieldMapping, frame: int, grid: tuple[int, int] | None, pixels: tuple[int, int]
+) -> height_maps.Elements:
+    """Squares about the markers at rest, or all of a map of so many pixels."""
+    place = members["displacement"][frame] if mapping.is_of_places else members.get("position")
+    if place is None:
+        if grid is None:
+            raise InvalidInput("grid", "not there", "the number of elements into which height is divided")
+        assert mapping.pixel is not None
+        return height_maps.Elements.dividing(pixels, mapping.pixel, grid)
+    told = members.get("element_area")
+    area = element_area("position", place) if told is None else float(np.asarray(told))
+    return height_maps.Elements(np.asarray(place, dtype=np.float64), (math.sqrt(area),) * 2)
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
@@ -200,7 +256,7 @@ def _has_truth_values(value: Any) -> bool:
 def _in_si(name: str, array: NDArray[Any], origin: Origin, metadata: dict[str, str]) -> NDArray[Any]:
     if name == "time":
         return _seconds(array, origin, metadata)
-    dtypes = DTYPES[name]
+    dtypes = DTYPES.get(name, FLOAT)
     if dtypes == TEXT:
         if array.dtype.kind != "U":
             raise InvalidInput(name, f"of dtype {array.dtype}", "text")

@@ -27,11 +27,13 @@ UNITS: dict[str, Mapping[str, float]] = {
     "force": FORCE,
     "gripper_force": FORCE,
     "gripper_force_deviation": FORCE,
+    "height": LENGTH,
 }
 """Factors to SI of what may be given otherwise."""
 COMPONENTS = {
     "object_pose": (LENGTH, LENGTH, ANGLE),
     **{name: (UNITS[name],) * 3 for name in ("position", "displacement", "force")},
+    "height": (LENGTH,),
 }
 """Those of what may have a unit a component; one that begins with a minus turns that axis."""
 
@@ -46,7 +48,9 @@ LARGEST = 1e300
 
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
-_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element", "rest", "notes")
+MAPPED = (*DTYPES, "height")
+"""What a mapping may name: the members of a log, and maps of height, of which its displacement along z is made."""
+_SETTINGS = ("topic", "grid", "pitch", "pixel", "pixels", "tolerance", "episode", "element", "rest", "notes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +73,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
-    """Origin of each member, and what the file may lack: lattice, pitch (m), tolerance (s), episode, and the column
-    that numbers the elements where a table has a row for each, and the frame or file at ``rest``, whose
-    displacement is 0.
+    """Origin of each member, and what the file may lack: lattice, pitch (m), the side of a height map's ``pixel`` (m),
+    rows and columns of its ``pixels``, tolerance (s), episode, and the column that numbers the elements where a table
+    has a row for each, and the frame or file at ``rest``, whose displacement is 0.
 
     ``text`` is the mapping as it was given, empty where none was. ``notes`` are fields kept in the metadata, by
     name. A ``preset`` may have ``alternatives``, of which the first whose fields are there is taken.
@@ -80,6 +84,8 @@ class FieldMapping:
     origins: Mapping[str, Origin]
     grid: tuple[int, int] | None = None
     pitch: float | None = None
+    pixel: float | None = None
+    pixels: tuple[int, int] | None = None
     tolerance: float | None = None
     episode: int | None = None
     element: str | None = None
@@ -136,16 +142,18 @@ def parse(text: str) -> FieldMapping:
 
 def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
     """The mapping that is ``given``, where another may have been ``told``, such as a preset."""
-    unknown = sorted(given.keys() - DTYPES.keys() - set(_SETTINGS))
+    unknown = sorted(given.keys() - {*MAPPED, *_SETTINGS})
     if "pressure" in unknown:
         raise InvalidInput("pressure", "mapped", PRESSURE_ALONE)
     if unknown:
-        raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*DTYPES, *_SETTINGS)))
+        raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*MAPPED, *_SETTINGS)))
     topic = _text("topic", given["topic"]) if "topic" in given else None
     return FieldMapping(
-        origins={name: _required(name, told, _origin(name, given[name], topic)) for name in DTYPES if name in given},
-        grid=_grid(given["grid"]) if "grid" in given else None,
+        origins={name: _required(name, told, _origin(name, given[name], topic)) for name in MAPPED if name in given},
+        grid=_grid("grid", given["grid"], "markers") if "grid" in given else None,
         pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
+        pixel=_positive("pixel", given["pixel"]) if "pixel" in given else None,
+        pixels=_grid("pixels", given["pixels"], "pixels") if "pixels" in given else None,
         tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
         episode=_episode(given["episode"]) if "episode" in given else None,
         element=_text("element", given["element"]) if "element" in given else None,
@@ -215,10 +223,10 @@ def _text(name: str, value: Any) -> str:
     return value
 
 
-def _grid(value: Any) -> tuple[int, int]:
+def _grid(name: str, value: Any, of: str) -> tuple[int, int]:
     sides = value if isinstance(value, list) else []
     if len(sides) != 2 or not all(type(side) is int and 1 <= side <= 10_000 for side in sides):
-        raise InvalidInput("grid", repr(value)[:60], "two whole numbers of markers, 1 to 10000")
+        raise InvalidInput(name, repr(value)[:60], f"two whole numbers of {of}, 1 to 10000")
     return sides[0], sides[1]
 
 

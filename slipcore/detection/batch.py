@@ -40,6 +40,9 @@ def detect_slip(
     ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their defaults. Raises
     ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
+    if not log.sees_along_surface:
+        allowed = "x and y of it, too: what moves along the normal alone shows neither slip nor friction"
+        raise InvalidInput("displacement", log.metadata["displacement"], allowed)
     if method == DEFAULT_METHOD and not log.has_displacement:
         method = FORCES_METHOD
     if sensor_model is not None:

@@ -59,6 +59,8 @@ class PriorDefaults(Options):
     """Smallest such ratio that the data may choose."""
     largest_shear: Annotated[float, Option(0.01, 100.0, "-", "rubber on a clean face")] = 1.0
     """Largest such ratio that the data may choose."""
+    unseen_shear: Annotated[float, Option(1e-6, 10.0, "-", "so small that pressure alone explains depth")] = 0.02
+    """Such a ratio, not chosen by data, where displacement along the normal alone is seen."""
     jitter: Annotated[float, Option(0.0, 1e-3, "-", "rounding of a thousand nodes' Cholesky factor")] = 1e-8
     """Added to the correlation of a node with itself, so that nodes much closer than a length stay distinct."""
 

@@ -31,9 +31,9 @@ class DisplacementData:
         """
         if not log.is_scaled:
             raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
-        axes = axes_seen(log.displacement)
+        axes = axes_seen(log.displacement) if log.sees_along_surface else (2,)
         if noise is None:
-            noise = noise_of(log.time, log.displacement)
+            noise = noise_of(log.time, log.displacement[..., slice(2) if log.sees_along_surface else slice(2, 3)])
         check_noise(noise)
         at_end = saturated(log.displacement, log.observed)
         return cls(*rows(log.displacement, seen_along(log.observed, at_end), axes), axes, noise, at_end)
@@ -92,8 +92,8 @@ def check_noise(noise: float) -> None:
 
 
 def noise_of(time: FloatArray, displacement: FloatArray) -> float:
-    """Noise (m) of a marker's coordinate in the plane, by displacements [t, n, m, 3] m; 0 where none shows."""
+    """Noise (m) of a marker's coordinate, by displacements [t, n, m, a] m; 0 where none shows."""
     from slipcore.noise import estimate_noise  # compiled
 
-    plane = displacement[..., :2].reshape(len(time), -1, 2).swapaxes(1, 2)
-    return float(np.nan_to_num(estimate_noise(time, plane)))
+    series = displacement.reshape(len(time), -1, displacement.shape[-1]).swapaxes(1, 2)
+    return float(np.nan_to_num(estimate_noise(time, series)))

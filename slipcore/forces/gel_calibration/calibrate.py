@@ -126,6 +126,8 @@ def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float,
     for log in logs:
         if not np.array_equal(log.position, first.position) or log.element_area != first.element_area:
             raise InvalidInput("logs", "of several lattices", "one sensor at a time")
+        if not log.sees_along_surface:
+            raise InvalidInput("logs", "of displacement along the normal alone", "markers along the surface, too")
     position, nodes = _lattice(first)
     recordings = [DisplacementData.of(log, noise) for log in logs]
     axes = min((recording.axes for recording in recordings), key=len)

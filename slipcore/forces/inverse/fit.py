@@ -165,7 +165,8 @@ def choose_prior(
 ) -> TractionPrior:
     """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion.
 
-    ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept.
+    ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept. A shear
+    smaller than any that data may choose is kept as well.
     """
     r, y = condensed(*observation.whitened(support, data))
     whitened = data / observation.noise
@@ -182,7 +183,7 @@ def choose_prior(
         return TractionPrior(best, evaluate(best, criterion)[1])
     evidence = evaluate(best, "evidence")[0]
     for name, values in choices().items():
-        for value in values:
+        for value in () if name == "shear" and best.shear < min(values) else values:
             other = best._replace(**{name: value})
             if other != best and (found := evaluate(other, "evidence")[0]) > evidence:
                 best, evidence = other, found

@@ -24,6 +24,11 @@ def usual() -> Smoothness:
     return Smoothness(PRIOR.pressure_length, PRIOR.traction_length, PRIOR.shear)
 
 
+def of_depth_alone() -> Smoothness:
+    """Where it begins for displacement along the normal alone, in which shear could stand for pressure."""
+    return usual()._replace(shear=PRIOR.unseen_shear)
+
+
 def choices() -> dict[str, tuple[float, ...]]:
     """Values of each property of a prior's shape among which the data choose."""
     pressure, traction, shear = usual()

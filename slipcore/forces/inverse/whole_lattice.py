@@ -11,7 +11,7 @@ import numpy as np
 from slipcore.forces.defaults import LATTICE
 from slipcore.forces.inverse.covariance import covariance_root, solve_root
 from slipcore.forces.inverse.fit import ObservationModel
-from slipcore.forces.inverse.prior import factors, usual
+from slipcore.forces.inverse.prior import Smoothness, factors
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import FloatArray
 
@@ -24,10 +24,10 @@ class WholeLattice:
     deviation: FloatArray
 
 
-def whole_lattice(observation: ObservationModel, nodes: Nodes, typical: float) -> WholeLattice:
-    """The operator for displacements of the root mean square ``typical`` m."""
+def whole_lattice(observation: ObservationModel, nodes: Nodes, typical: float, shape: Smoothness) -> WholeLattice:
+    """The operator for displacements of the root mean square ``typical`` m, under a prior of this ``shape``."""
     m = len(observation.noise)
-    root = factors(nodes.places(), nodes.grid.pitch[0], usual())
+    root = factors(nodes.places(), nodes.grid.pitch[0], shape)
     whitened = observation.response / observation.noise[:, None, None]
     spread = np.stack([whitened[:, axis] @ root[axis] for axis in range(3)], axis=1)
     level = typical / float(np.median(observation.noise))

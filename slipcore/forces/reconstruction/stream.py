@@ -178,7 +178,8 @@ class ForceStream:
     def _noise_now(self) -> float:
         if self._given is not None:
             return self._given
-        return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
+        times, moved_by = zip(*self._recent, strict=True)
+        return noise_of(np.array(times), np.stack(moved_by)[..., :2])
 
     def _marker_frame(self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.

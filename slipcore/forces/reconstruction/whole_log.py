@@ -89,6 +89,7 @@ def reconstruct(
     without it the log's own ``gripper_force`` is taken where it is above 0. ``noise`` m of a marker's coordinate (None:
     estimated from the log); ``criterion`` that chooses the strength of the prior. Markers whose z never changes count
     as seen in the plane only, and displacements at the end of the sensor's range as not seen along that axis.
+    Of a log that saw displacement along the normal alone, forces along the surface are 0 with an infinite deviation.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
     shown = DisplacementData.of(log, noise)
@@ -105,7 +106,7 @@ def reconstruct(
     for t in map(int, np.flatnonzero(~touched)):
         _write_frame(result, t, FrameForces.unnoticed(log.grid, result.unnoticed, known[t]))
     if not touched.any():
-        return result
+        return _as_seen(result, sensor)
     tracker = Tracker.of(sensor, *recording.frame(strongest), criterion)
     result = replace(
         result,
@@ -122,7 +123,7 @@ def reconstruct(
                 reader = reader if reader.key is now.key else Reader.of(sensor, now.key)
                 _write_frame(result, t, reader.read(data, log.grid))
     away = known.away(result.resultant, result.resultant_deviation)
-    return replace(result, contradiction=np.where(touched[:, None], away, np.nan))
+    return _as_seen(replace(result, contradiction=np.where(touched[:, None], away, np.nan)), sensor)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,6 +158,22 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, unnotic
         contradiction=np.full((len(log), 3), np.nan),
         saturated=shown.saturated,
         unnoticed=unnoticed,
+    )
+
+
+def _as_seen(result: Reconstruction, sensor: SensorResponse) -> Reconstruction:
+    """The same, but that by depth alone no force along the surface is known."""
+    if sensor.sees_along_surface:
+        return result
+    unknown = np.array([np.inf, np.inf, 0.0])
+    normal = np.array([0.0, 0.0, 1.0])
+    return replace(
+        result,
+        force=result.force * normal,
+        deviation=result.deviation + unknown,
+        resultant=result.resultant * normal,
+        resultant_deviation=result.resultant_deviation + unknown,
+        information=result.information * normal,
     )
 
 

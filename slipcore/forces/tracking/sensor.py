@@ -6,6 +6,7 @@ import numpy as np
 
 from slipcore.forces.defaults import STRENGTH
 from slipcore.forces.inverse.fit import ObservationModel
+from slipcore.forces.inverse.prior import Smoothness, of_depth_alone, usual
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.response import response_matrices
@@ -65,7 +66,17 @@ class SensorResponse:
     @property
     def sees_depth(self) -> bool:
         """Whether its markers also show how deep they are pressed."""
-        return len(self.axes) == 3
+        return 2 in self.axes
+
+    @property
+    def sees_along_surface(self) -> bool:
+        """Whether they also show how they are moved sideways."""
+        return self.axes != (2,)
+
+    @property
+    def first_shape(self) -> Smoothness:
+        """Of the prior, from which its choice begins."""
+        return usual() if self.sees_along_surface else of_depth_alone()
 
     def observation(self, spread: FloatArray, known: KnownForce) -> ObservationModel:
         """Of a frame whose displacements have the standard deviations ``spread`` [m] m, and what is known of it."""
@@ -76,7 +87,8 @@ class SensorResponse:
         count = len(self.elements)
         if not self.sees_depth:
             return np.zeros(count, dtype=bool)
-        return np.asarray(np.isfinite(observation.noise[2 * count : 3 * count]))
+        before = count * self.axes.index(2)
+        return np.asarray(np.isfinite(observation.noise[before : before + count]))
 
     @staticmethod
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:

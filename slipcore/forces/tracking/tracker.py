@@ -66,7 +66,7 @@ class Tracker:
             support = _pressed(sensor, lattice, observation, data)
         else:
             support = relevant_nodes(observation, data, np.ones(nodes.grid.shape, dtype=bool))
-        prior = choose_prior(observation, data, nodes, support.ravel(), criterion)
+        prior = choose_prior(observation, data, nodes, support.ravel(), criterion, sensor.first_shape)
         key = Key(observation, data, fit(observation, nodes, support.ravel(), prior))
         begun = cls(sensor, criterion, prior, key, lattice)
         return begun if lattice is not None else begun._sought_in_the_plane(observation, data)
@@ -109,7 +109,7 @@ class Tracker:
 def lattice_of(sensor: SensorResponse, noise: float, typical: float) -> WholeLattice:
     """For markers with this ``noise`` m whose displacements have the root mean square ``typical`` m."""
     everywhere = ObservationModel(sensor.response, np.full(len(sensor.response), noise))
-    return whole_lattice(everywhere, sensor.nodes, typical)
+    return whole_lattice(everywhere, sensor.nodes, typical, sensor.first_shape)
 
 
 def _pressed(

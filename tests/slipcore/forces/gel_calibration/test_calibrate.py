@@ -141,6 +141,12 @@ def test_logs_that_are_no_presses_are_refused(logs: list[GraspLog], pressed: Pre
         calibrate_gel([line], [5.0])
 
 
+def test_presses_seen_by_depth_alone_are_refused(logs: list[GraspLog]) -> None:
+    alone = [replace(log, metadata={"displacement": "along the normal"}) for log in logs]
+    with pytest.raises(InvalidInput, match="logs is of displacement along the normal alone"):
+        calibrate_gel(alone, [2.0] * len(alone))
+
+
 def test_a_gaussian_is_met_through_its_points() -> None:
     rng = np.random.default_rng(1)
     mean, precision = np.array([0.3, 2.0]), np.array([[400.0, -30.0], [-30.0, 9.0]])

@@ -10,7 +10,7 @@ import pytest
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, Reconstruction, reconstruct
 from slipcore.forces.inverse.support import better_support
-from slipcore.forces.recording import least_power
+from slipcore.forces.recording import DisplacementData, least_power
 from slipcore.forces.tracking.sensor import SensorResponse
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
@@ -301,3 +301,37 @@ def test_what_does_not_fit_is_refused_by_name(pressed: Pressed) -> None:
         reconstruct(log, GEL, total_force_deviation=1.0)
     with pytest.raises(InvalidInput, match="criterion is l-curve"):
         reconstruct(log, GEL, noise=1e-6, criterion="l-curve")  # type: ignore[arg-type]
+
+
+DEPTH_ALONE = {"displacement": "along the normal"}
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-5])
+def test_depth_alone_tells_the_normal_force_and_nothing_of_the_tangential(pressed: Pressed, noise: float) -> None:
+    """Shear had stood for pressure: on thin gels all of the normal force was lost."""
+    log = pressed(LATE, noise=noise)
+    seen = replace(log, displacement=log.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
+    found = reconstruct(seen, GEL, noise=noise)
+    total = truth(log)[..., 2].sum(axis=(1, 2))
+    error = found.resultant[:, 2] - total
+    np.testing.assert_array_less(np.abs(error), 0.02 * np.abs(total))
+    np.testing.assert_array_less(np.abs(error), 2.0 * found.resultant_deviation[:, 2])
+    assert relative(found.force[..., 2], truth(log)[..., 2]) < 0.1
+    for deviation in (found.deviation, found.resultant_deviation):
+        np.testing.assert_array_equal(deviation[..., :2], np.inf)
+    np.testing.assert_array_equal(found.information[:2], 0.0)
+    assert found.information[2] > 0.99
+
+
+def test_where_nothing_touches_depth_alone_tells_no_tangential_force(pressed: Pressed) -> None:
+    log = pressed([0, 0], noise=1e-6)
+    seen = replace(log, displacement=1e-9 * log.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
+    deviation = reconstruct(seen, GEL, noise=1e-6).resultant_deviation
+    np.testing.assert_array_equal(deviation[:, :2], np.inf)
+    assert np.isfinite(deviation[:, 2]).all()
+
+
+def test_noise_of_depth_alone_is_that_of_depth(pressed: Pressed) -> None:
+    log = pressed([6] * 12, noise=2e-6)
+    seen = replace(log, displacement=log.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
+    assert DisplacementData.of(seen, None).noise == pytest.approx(2e-6, rel=0.2)

@@ -1,0 +1,154 @@
+"""Maps of height: what elements under them move by, and what is not seen."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from service import formats
+from service.formats.height_maps import Elements, rise
+from slipcore import InvalidInput, detect_slip
+from slipcore.frames import FloatArray
+
+PIXEL = 0.1e-3
+PIXELS = (60, 80)
+GRID = (6, 8)
+"""Elements of 10 × 10 pixels, 1 mm wide."""
+Y, X = np.meshgrid(*(PIXEL * (np.arange(n) - 0.5 * (n - 1)) for n in PIXELS), indexing="ij")
+
+
+def plane(rise_x: float, rise_y: float, rise_0: float = 0.0) -> FloatArray:
+    return rise_0 + rise_x * X + rise_y * Y
+
+
+CURVED = 0.5e-3 * np.exp(-(X**2 + Y**2) / (3e-3) ** 2)
+"""The surface at rest."""
+
+
+def file_of(folder: Path, height: Any, mapping: dict[str, Any], **others: Any) -> Path:
+    path = folder / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["time"] = 0.03 * np.arange(len(height))
+        file["depth"] = height
+        for name, value in others.items():
+            file[name] = value
+        file.attrs["stiction_mapping"] = json.dumps({"pixel": PIXEL, "height": "depth", "grid": list(GRID), **mapping})
+    return path
+
+
+def test_a_plane_rises_by_its_value_at_each_centre(tmp_path: Path) -> None:
+    """The mean of a linear function is its value at the centre; x runs along columns, y along rows."""
+    log = formats.read(file_of(tmp_path, CURVED + np.stack([plane(0.0, 0.0), plane(2e-3, -1e-3, -3e-5)]), {}))
+    x, y = np.moveaxis(log.position[..., :2], -1, 0)
+    assert log.element_area == pytest.approx(1e-6)
+    np.testing.assert_allclose(np.diff(x, axis=1), 1e-3, rtol=1e-9)
+    np.testing.assert_allclose(np.diff(y, axis=0), 1e-3, rtol=1e-9)
+    np.testing.assert_allclose(log.displacement[1, ..., 2], -3e-5 + 2e-3 * x - 1e-3 * y, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(log.displacement[0], 0.0)
+    assert log.observed is not None
+    assert log.observed.all()
+    assert (log.metadata["displacement"], log.metadata["rest"]) == ("along the normal", "frame 0")
+
+
+def test_depth_in_mm_has_a_unit_that_turns_it(tmp_path: Path) -> None:
+    pressed = 1e3 * np.stack([CURVED, CURVED + 0.2e-3])
+    log = formats.read(file_of(tmp_path, pressed, {"height": {"field": "depth", "unit": "-mm"}}))
+    np.testing.assert_allclose(log.displacement[1, ..., 2], -0.2e-3, rtol=1e-9)
+
+
+def test_elements_between_pixels_weigh_them_by_area() -> None:
+    """Of three pixels in two elements, the middle one counts half for each."""
+    elements = Elements.dividing((1, 3), 1.0, (1, 2))
+    np.testing.assert_allclose(elements.shares((1, 3), 1.0).toarray(), [[2 / 3, 1 / 3, 0], [0, 1 / 3, 2 / 3]])
+    risen, seen = rise(np.array([[[3.0, 6.0, np.nan]]]), np.zeros((1, 3)), elements.shares((1, 3), 1.0))
+    np.testing.assert_allclose(risen, [[4.0, 0.0]])
+    np.testing.assert_array_equal(seen, [[True, False]])
+
+
+def test_missing_pixels_do_not_let_a_curved_rest_show(tmp_path: Path) -> None:
+    height = CURVED - np.array([0.0, 1e-4, 1e-4])[:, None, None]
+    height[1, :, 3:7] = np.nan  # under half of the elements' first column
+    height[2, :4, 10:18] = np.nan
+    height[0, 30:36, 40:] = np.nan  # over half at rest
+    log = formats.read(file_of(tmp_path, height, {}))
+    assert log.observed is not None
+    assert not log.observed[:, 3, 4:].any()
+    assert log.observed[1:, :3].all()
+    seen = np.broadcast_to(log.observed[1:], log.displacement[1:, ..., 2].shape)
+    np.testing.assert_allclose(log.displacement[1:, ..., 2][seen], -1e-4, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("rest", "frame"), [("2", 2), ("least contact", 1)])
+def test_the_frame_at_rest_is_that_which_is_chosen(tmp_path: Path, rest: str, frame: int) -> None:
+    """Of least contact is the frame in which the surface stands highest."""
+    level = np.array([-1e-4, 0.0, -2e-4])
+    log = formats.read(file_of(tmp_path, CURVED + level[:, None, None], {}), rest=rest)
+    expected = (level - level[frame])[:, None, None] * np.ones(GRID)
+    np.testing.assert_allclose(log.displacement[..., 2], expected, rtol=0, atol=1e-12)
+    assert log.metadata["rest"] == f"frame {frame}"
+
+
+def test_markers_beside_take_the_height_around_them(tmp_path: Path) -> None:
+    """Their places are from the middle of the map, and they count from the same frame at rest."""
+    x, y = np.meshgrid([-2e-3, 0.0, 2e-3], [-1e-3, 1e-3])
+    at_rest = np.stack([x, y], axis=-1)
+    place = np.stack([at_rest + 1e-4, at_rest])
+    height = np.stack([plane(0.0, 3e-3, 1e-5), plane(0.0, 0.0)])
+    fields = {name: {"field": ["x", "y"]} for name in ("displacement", "position")}
+    path = file_of(tmp_path, height, {**fields, "grid": [2, 3], "rest": "1"}, x=place[..., 0], y=place[..., 1])
+    log = formats.read(path)
+    np.testing.assert_allclose(log.position[..., :2], at_rest, atol=1e-15)
+    np.testing.assert_allclose(log.displacement[0, ..., :2], 1e-4, rtol=1e-9)
+    np.testing.assert_allclose(log.displacement[0, ..., 2], 1e-5 + 3e-3 * y, rtol=0, atol=1e-12)
+    assert "displacement" not in log.metadata
+    assert log.contact is None  # z shows it
+
+
+@pytest.mark.parametrize(
+    ("mapping", "said"),
+    [
+        ({"pixel": -1.0}, "pixel"),
+        ({"pitch": 1e-3}, "height is with a pitch"),
+        ({"pixels": [3, 3]}, r"height is of shape \[2, 60, 80\]; allowed: \[frames, 3, 3\]"),
+        ({"displacement": "moved"}, "displacement is of shape"),
+        ({"height": {"field": "depth", "unit": "N"}}, "unit of height"),
+        ({"position": {"value": [[[9.0, 9.0, 0.0]] * 2] * 2}, "element_area": {"value": 1e-6}}, "none of an element"),
+        ({"rest": "7"}, "frame 7 of 2"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(tmp_path: Path, mapping: dict[str, Any], said: str) -> None:
+    path = file_of(tmp_path, np.stack([CURVED, CURVED]), {}, moved=np.ones((2, *GRID, 3)))
+    with pytest.raises(InvalidInput, match=said):
+        formats.read(path, mapping=json.dumps({"pixel": PIXEL, "height": "depth", "grid": list(GRID), **mapping}))
+
+
+def test_a_map_without_its_scale_or_number_of_elements_is_refused(tmp_path: Path) -> None:
+    path = file_of(tmp_path, np.stack([CURVED, CURVED]), {})
+    for name, said in (("pixel", "without pixel"), ("grid", "grid is not there")):
+        mapping = {"pixel": PIXEL, "height": "depth", "grid": list(GRID)}
+        del mapping[name]
+        with pytest.raises(InvalidInput, match=said):
+            formats.read(path, mapping=json.dumps(mapping))
+    with pytest.raises(InvalidInput, match="of maps of height no file"):
+        formats.read(path, rest=path)
+
+
+def test_flat_maps_of_json_need_their_rows_and_columns(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    height = np.stack([CURVED, CURVED - 1e-4]).reshape(2, -1)
+    path.write_text(json.dumps({"time": [0.0, 0.03], "depth": height.tolist()}), encoding="utf-8")
+    mapping = {"pixel": PIXEL, "height": "depth", "grid": list(GRID)}
+    with pytest.raises(InvalidInput, match="`pixels` in the mapping"):
+        formats.read(path, mapping=json.dumps(mapping))
+    log = formats.read(path, mapping=json.dumps(mapping | {"pixels": list(PIXELS)}))
+    np.testing.assert_allclose(log.displacement[1, ..., 2], -1e-4, rtol=1e-9)
+
+
+def test_slip_is_not_looked_for_in_height_alone(tmp_path: Path) -> None:
+    """Nothing would seem to slip."""
+    log = formats.read(file_of(tmp_path, np.stack([CURVED, CURVED]), {}))
+    with pytest.raises(InvalidInput, match="displacement is along the normal; allowed: x and y of it"):
+        detect_slip(log)
