@@ -23,7 +23,7 @@ def observation() -> ObservationModel:
 def test_pressure_is_the_mean_of_a_normal_posterior(observation: ObservationModel) -> None:
     """Where unknowns of a joint normal distribution are conditioned on data, by the covariance of both."""
     typical = 4e-6
-    found = whole_lattice(observation, NODES, typical)
+    found = whole_lattice(observation, NODES, typical, usual())
     root = factors(NODES.places(), 1e-3, usual())
     prior = np.stack([part @ part.T for part in root])
     of_data = np.einsum("mai,aij,naj->mn", observation.response, prior, observation.response)
