@@ -120,7 +120,8 @@ def restore(
 ) -> list[str]:
     """Fill an empty database and blob store from a backup; they become a store of their own, with an id of its own.
 
-    Every blob must have the bytes that it is named for. Those that the backup itself left out, and nobody has put into
+    One that an older version made is brought to today's schema on the way. Every blob must have the bytes that it is
+    named for. Those that the backup itself left out, and nobody has put into
     it since, are missing afterwards; returns what is said of each. A blob store of another database is only filled
     where it is ``taken_over_by`` somebody, as the audit trail then records; that database is refused there from then
     on. Raises ``NotEmpty`` for a database that has any rows and for a store that has the backup's blobs or is inside
@@ -135,6 +136,8 @@ def restore(
         raise NotEmpty(str(blobs), "a data folder other than the backup's and outside of it")
     source = BlobStore(folder)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
+        if migrate.current(copy) is not None:
+            migrate.upgrade(copy)  # ours alone: the backup stays of the version that made it
         migrate.check(copy)
         _require_blobs(copy, source, blobs, _lacking(folder))
         _refuse_rows(database)

@@ -310,6 +310,22 @@ def test_a_restore_that_is_refused_leaves_an_empty_database_as_it_was(
         assert inspect(connection).get_table_names() == []
 
 
+def test_a_backup_of_an_older_version_is_restored_and_stays_as_it_is(
+    filled: Database, other: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    copy, before = tmp_path / "copy", rows(filled)
+    backup(filled, blobs, copy, nothing)
+    with closing(Database(f"sqlite:///{copy / FILE}")) as database:
+        migrate.downgrade(database, "0026", lose=True)
+        database.empty_log()
+    content = (copy / FILE).read_bytes()
+    restore(copy, other, BlobStore(tmp_path / "again"), nothing)
+    after = rows(other)
+    assert {name: len(found) for name, found in after.items()} == {name: len(found) for name, found in before.items()}
+    assert [each["sha256"] for each in after["grasp_logs"]] == [each["sha256"] for each in before["grasp_logs"]]
+    assert (copy / FILE).read_bytes() == content
+
+
 def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(
     filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
 ) -> None:
