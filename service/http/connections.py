@@ -100,7 +100,7 @@ class BoundedConnection(asyncio.Protocol):
         self._per_address = per_address
         self._is_beyond = False
         self._held, self._waits_for_turn = b"", False
-        self._is_refused = False
+        self._is_refused, self.is_let_go = False, False
         self.idle_since = self.loop.time()
 
     @property
@@ -245,27 +245,30 @@ class BoundedConnection(asyncio.Protocol):
         """Close another connection where there are too many, of this address or in all, or else refuse what comes on
         this one.
         """
-        held = [each for each in self.connections if not each.transport.is_closing() or _has_unsent(each)]
-        same = [each for each in held if _address(each) == _address(self)]
-        if self._per_address is not None and self.client is not None and len(same) > self._per_address:
-            self._is_beyond = not self._close_one(same)
-        elif self._most is not None and len(held) > self._most:
-            self._close_one(held)
+        count = len(self.connections)
+        if self._per_address is not None and self.client is not None and count > self._per_address:
+            same = [each for each in self.connections if _address(each) == self.client[0]]
+            held = [each for each in same if not each.transport.is_closing() or _has_unsent(each)]
+            if len(held) > self._per_address:
+                self._is_beyond = not self._close_one(held)
+                return
+        if self._most is not None and count > self._most:
+            self._close_one(self._of_largest_address())
+
+    def _of_largest_address(self) -> list[Any]:
+        """Of the addresses that have an idle connection, the connections of the one that has most."""
+        addresses = Counter(map(_address, self.connections))
+        idle = {_address(each) for each in self.connections if each is not self and _is_idle(each)}
+        largest = max(idle, key=addresses.__getitem__, default=None)
+        return [each for each in self.connections if _address(each) == largest]
 
     def _close_one(self, held: list[Any]) -> bool:
-        """Close the longest idle of the address that has most; returns whether one of these is idle."""
+        """Close one that is closing with what its client does not read, or the longest idle; whether there is one."""
         unneeded = [each for each in held if each is not self and _is_unneeded(each)]
         if not unneeded:
             return False
-        counts = Counter(map(_address, held))
-        least = min(
-            unneeded,
-            key=lambda each: (
-                not each.transport.is_closing(),
-                -counts[_address(each)],
-                getattr(each, "idle_since", 0.0),
-            ),
-        )
+        least = min(unneeded, key=lambda each: (not each.transport.is_closing(), getattr(each, "idle_since", 0.0)))
+        least.is_let_go = True
         if _has_unsent(least):
             least.transport.abort()
         else:
@@ -317,9 +320,14 @@ def _has_unsent(connection: Any) -> bool:
     return bool(connection.transport.get_write_buffer_size() > 0)
 
 
+def _is_idle(connection: Any) -> bool:
+    """Whether a connection asks nothing and stays."""
+    return isinstance(connection, BoundedConnection) and connection.is_idle and not connection.is_let_go
+
+
 def _is_unneeded(connection: Any) -> bool:
     """Whether a connection has nothing more to do than to let its client read."""
-    return connection.transport.is_closing() or (isinstance(connection, BoundedConnection) and connection.is_idle)
+    return _is_idle(connection) or (connection.transport.is_closing() and not getattr(connection, "is_let_go", False))
 
 
 class H11Connection(BoundedConnection, H11Protocol):
