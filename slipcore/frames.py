@@ -248,7 +248,7 @@ def check_position(position: ArrayLike) -> FloatArray:
     return checked
 
 
-def check_element_area(area: float) -> float:
+def check_element_area(area: ArrayLike) -> float:
     """Area of one micro-element in m², refused where absurd."""
     low, high = LIMITS.element_area
     value = float(_array("element_area", area, ()))

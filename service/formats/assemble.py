@@ -14,7 +14,16 @@ from service.formats.mapping import COMPONENTS, PRESSURE_ALONE, FieldMapping, Or
 from service.formats.members import DTYPES, FLAG, FLOAT, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
-from slipcore.frames import ALONG_NORMAL, NONE, BoolArray, FloatArray, GraspLog, check_mask
+from slipcore.frames import (
+    ALONG_NORMAL,
+    NONE,
+    BoolArray,
+    FloatArray,
+    GraspLog,
+    check_element_area,
+    check_mask,
+    check_position,
+)
 
 MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 """Bytes of all that is read of one file: they are held twice while the log is made of them."""
@@ -61,6 +70,8 @@ def _log(
     if "force" in members:
         _check_no_pressure(members["force"], mapping, grid)
     if "force" in members and "displacement" not in members:
+        if "height" in members:
+            raise InvalidInput("height", "beside force alone", "displacement of markers beside both, or either alone")
         members["displacement"] = np.zeros(members["force"].shape)
         metadata["displacement"] = NONE
     for name in (*VECTORS, *MASKS):
@@ -68,13 +79,13 @@ def _log(
             members[name] = _on_grid(name, members[name], grid)
     has_height = "height" in members
     if has_height:
-        mapping = _from_heights(members, mapping, grid, metadata)
+        _from_heights(members, mapping, grid, metadata)
     for name in ("displacement", "time"):
         _require(name, members, recording)
     if "position" not in members and mapping.pitch is not None:
         members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
         metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
-    if mapping.rest is not None or mapping.is_of_places:
+    if not has_height and (mapping.rest is not None or mapping.is_of_places):
         _from_rest(members, mapping, metadata)
     _require("position", members, recording)
     flat = not has_height and len(mapping.origins["displacement"].fields) == 2
@@ -96,8 +107,8 @@ def _log(
 
 def _from_heights(
     members: dict[str, NDArray[Any]], mapping: FieldMapping, grid: tuple[int, int] | None, metadata: dict[str, str]
-) -> FieldMapping:
-    """Displacement along z by maps of height; what remains of the mapping, with all else at rest in the same frame.
+) -> None:
+    """Displacement along z by maps of height, after that of markers from rest in the same frame.
 
     Elements are where the markers are, or divide the map. Without markers nothing is known along the surface.
     """
@@ -108,7 +119,9 @@ def _from_heights(
     if isinstance(mapping.rest, rest.SensorAlone) or mapping.rest == rest.ALL_FRAMES:
         raise InvalidInput("rest", "a file", "a frame: of maps of height no file of the sensor alone is read")
     frame = height_maps.frame_at_rest(mapping.rest, height, members)
-    elements = _elements_of(members, mapping, frame, grid, pixels)
+    if "displacement" in members and (mapping.rest is not None or mapping.is_of_places):
+        _from_rest(members, mapping.at_rest(str(frame)), metadata)
+    elements = _elements_of(members, mapping.pixel, grid, pixels)
     risen, seen = height_maps.rise(height, height[frame], elements.shares(pixels, mapping.pixel))
     if not seen.any():
         raise InvalidInput(
@@ -118,7 +131,7 @@ def _from_heights(
     if "displacement" not in members:
         members["displacement"], metadata["displacement"] = np.zeros((*shape, 3)), ALONG_NORMAL
     moved = np.array(members["displacement"], dtype=np.float64)
-    if moved.shape != (*shape, 3) or moved[..., 2].any():
+    if moved.shape != (*shape, 3) or np.nan_to_num(moved[..., 2]).any():
         raise InvalidInput("displacement", f"of shape {list(moved.shape)}", f"{[*shape, 3]} beside height, with no z")
     moved[..., 2] = risen.reshape(shape)
     members["displacement"] = moved
@@ -127,23 +140,22 @@ def _from_heights(
     members.setdefault("position", elements.position)
     members.setdefault("element_area", np.array(elements.area))
     metadata["rest"] = f"frame {frame}"
-    is_counted = mapping.rest is not None or mapping.is_of_places
-    return mapping.at_rest(str(frame)) if is_counted else mapping
 
 
 def _elements_of(
-    members: Members, mapping: FieldMapping, frame: int, grid: tuple[int, int] | None, pixels: tuple[int, int]
+    members: Members, pixel: float, grid: tuple[int, int] | None, pixels: tuple[int, int]
 ) -> height_maps.Elements:
-    """Squares about the markers at rest, or all of a map of so many pixels."""
-    place = members["displacement"][frame] if mapping.is_of_places else members.get("position")
-    if place is None:
-        if grid is None:
-            raise InvalidInput("grid", "not there", "the number of elements into which height is divided")
-        assert mapping.pixel is not None
-        return height_maps.Elements.dividing(pixels, mapping.pixel, grid)
-    told = members.get("element_area")
-    area = element_area("position", place) if told is None else float(np.asarray(told))
-    return height_maps.Elements(np.asarray(place, dtype=np.float64), (math.sqrt(area),) * 2)
+    """Squares about the markers at rest, or all of a map of so many pixels, a ``pixel`` m wide."""
+    if "position" in members:
+        position = check_position(members["position"])
+        told = members.get("element_area")
+        area = element_area("position", position) if told is None else check_element_area(told)
+        return height_maps.Elements(position, (math.sqrt(area),) * 2)
+    if grid is None:
+        raise InvalidInput("grid", "not there", "the number of elements into which height is divided")
+    if grid[0] > pixels[0] or grid[1] > pixels[1]:
+        raise InvalidInput("grid", str(list(grid)), f"at most {list(pixels)}, the pixels of a map of height")
+    return height_maps.Elements.dividing(pixels, pixel, grid)
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:

@@ -45,23 +45,21 @@ class Elements:
         """Shares of the elements' areas that lie on each pixel, [n · m, rows · columns]."""
         from scipy.sparse import csr_array  # few files need it
 
-        x, y = self.position[..., :2].reshape(-1, 2).T
-        down, across = _shares(y, self.sides[1], pixels[0], pixel), _shares(x, self.sides[0], pixels[1], pixel)
         values, columns, ends = [np.empty(0)], [np.empty(0, dtype=np.int64)], [0]
-        for row, column in zip(down, across, strict=True):
+        for x, y in self.position[..., :2].reshape(-1, 2):
+            row, column = _shares(y, self.sides[1], pixels[0], pixel), _shares(x, self.sides[0], pixels[1], pixel)
             i, j = np.flatnonzero(row), np.flatnonzero(column)
             values.append(np.outer(row[i], column[j]).ravel())
             columns.append((i[:, None] * pixels[1] + j).ravel())
             ends.append(ends[-1] + len(i) * len(j))
-        shape = (len(x), pixels[0] * pixels[1])
+        shape = (len(ends) - 1, pixels[0] * pixels[1])
         return csr_array((np.concatenate(values), np.concatenate(columns), ends), shape=shape)
 
 
-def _shares(middle: FloatArray, side: float, count: int, pixel: float) -> FloatArray:
-    """Of the interval about each ``middle`` [e] m, the share that lies on each of so many pixels, [e, count]."""
+def _shares(middle: float, side: float, count: int, pixel: float) -> FloatArray:
+    """Of the interval about ``middle`` m, the share that lies on each of so many pixels, [count]."""
     edge = pixel * (np.arange(count + 1) - 0.5 * count)
-    inside = np.clip(edge, (middle - 0.5 * side)[:, None], (middle + 0.5 * side)[:, None])
-    return np.asarray(np.diff(inside, axis=1) / side)
+    return np.asarray(np.diff(np.clip(edge, middle - 0.5 * side, middle + 0.5 * side)) / side)
 
 
 def maps_of(height: NDArray[np.floating], pixels: tuple[int, int] | None) -> FloatArray:

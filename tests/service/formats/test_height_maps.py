@@ -107,6 +107,61 @@ def test_markers_beside_take_the_height_around_them(tmp_path: Path) -> None:
     assert log.contact is None  # z shows it
 
 
+PLACES = {"position": "markers", "displacement": "markers"}
+FRAMES = np.stack([CURVED, CURVED - 1e-4, CURVED - 1e-4])
+
+
+def markers(offset_x: float = 0.0) -> FloatArray:
+    """Places [3, 6, 8, 3] m of markers a millimetre apart about the middle of a map that stand still."""
+    x, y = np.meshgrid(*(1e-3 * (np.arange(n) - 0.5 * (n - 1)) for n in (8, 6)))
+    return np.stack([np.stack([x + offset_x, y, np.zeros_like(x)], axis=-1)] * 3)
+
+
+def test_a_marker_lost_at_rest_costs_no_other(tmp_path: Path) -> None:
+    """Its place, NaN there, had made every square's side NaN. It is where it was seen later, as without maps."""
+    place, observed = markers(), np.ones((3, *GRID), dtype=bool)
+    place[0, 1, 2], observed[0, 1, 2] = np.nan, False
+    path = file_of(tmp_path, FRAMES, {**PLACES, "observed": "seen"}, markers=place, seen=observed)
+    log = formats.read(path)
+    observed[:, 1, 2] = False
+    np.testing.assert_array_equal(log.observed, observed)
+    np.testing.assert_allclose(log.displacement[1:, ..., 2][observed[1:]], -1e-4, rtol=1e-9)
+    np.testing.assert_allclose(log.position, markers()[0], atol=1e-15)
+    assert log.element_area == pytest.approx(1e-6)
+
+
+def test_markers_beyond_the_map_are_not_observed_however_they_are_told(tmp_path: Path) -> None:
+    place = markers(offset_x=0.6e-3)
+    told = {"position": "at", "displacement": "moved"}
+    logs = [
+        formats.read(file_of(tmp_path, FRAMES, PLACES, markers=place)),
+        formats.read(file_of(tmp_path, FRAMES, told, at=place[0], moved=np.zeros_like(place))),
+    ]
+    for log in logs:
+        assert log.observed is not None
+        assert log.observed[..., :7].all()
+        assert not log.observed[..., 7].any()
+    np.testing.assert_array_equal(logs[0].displacement, logs[1].displacement)
+
+
+@pytest.mark.parametrize("shape", [(0, *GRID, 3), (3, *GRID, 1), (2, *GRID, 3), (3, *GRID, 2, 3)])
+def test_places_of_another_shape_are_refused_by_name(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    with pytest.raises(InvalidInput, match=r"(displacement|position) is of shape"):
+        formats.read(file_of(tmp_path, FRAMES, PLACES, markers=np.resize(markers(), shape)))
+
+
+def test_height_beside_force_without_markers_is_refused(tmp_path: Path) -> None:
+    """Such a log would have said that it has no displacement."""
+    path = file_of(tmp_path, FRAMES, {"force": "f"}, f=np.ones((3, *GRID, 3)))
+    with pytest.raises(InvalidInput, match="height is beside force alone"):
+        formats.read(path)
+    path = file_of(tmp_path, FRAMES, {"force": "f", **PLACES}, f=np.ones((3, *GRID, 3)), markers=markers())
+    assert formats.read(path).has_displacement
+
+
+FAR_OFF = [[[0.1, 0.1, 0.0], [0.101, 0.1, 0.0]], [[0.1, 0.101, 0.0], [0.101, 0.101, 0.0]]]
+
+
 @pytest.mark.parametrize(
     ("mapping", "said"),
     [
@@ -115,7 +170,12 @@ def test_markers_beside_take_the_height_around_them(tmp_path: Path) -> None:
         ({"pixels": [3, 3]}, r"height is of shape \[2, 60, 80\]; allowed: \[frames, 3, 3\]"),
         ({"displacement": "moved"}, "displacement is of shape"),
         ({"height": {"field": "depth", "unit": "N"}}, "unit of height"),
-        ({"position": {"value": [[[9.0, 9.0, 0.0]] * 2] * 2}, "element_area": {"value": 1e-6}}, "none of an element"),
+        ({"position": {"value": FAR_OFF}}, "none of an element"),
+        ({"position": {"value": FAR_OFF}, "element_area": {"value": -1e-6}}, "element_area is -1e-06 m²"),
+        ({"position": {"value": FAR_OFF}, "element_area": {"value": [1e-6, 1e-6]}}, r"element_area is of shape \[2\]"),
+        ({"position": {"value": np.zeros((*GRID, 1)).tolist()}}, r"position is of shape \[6, 8, 1\]"),
+        ({"grid": [6, 81]}, r"grid is \[6, 81\]; allowed: at most \[60, 80\]"),
+        ({"grid": [3000, 3000]}, r"grid is \[3000, 3000\]"),
         ({"rest": "7"}, "frame 7 of 2"),
     ],
 )
