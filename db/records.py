@@ -278,13 +278,10 @@ class Detection:
 
 
 class SeenClock(NamedTuple):
-    """When a server last looked at the clock, ``at``; for how many seconds it has been ``steady`` while one looked; and
-    the number of the newest log as that began.
-    """
+    """When a server last looked at the clock, ``at``, and for how many seconds it has been ``steady`` while one did."""
 
     at: datetime
     steady: float
-    log_number: int
 
 
 class Signature(NamedTuple):

@@ -427,7 +427,7 @@ class StoreRow(Base):
 
     ``webhook_entry_id``: the newest entry of the audit trail that the webhook has had or is never to have.
     ``clock_seen_at``: when a server last looked at the clock, by which uploads grow old; ``clock_steady_seconds`` for
-    which it has been steady while one looked, and ``clock_log_number`` of the newest log as that began.
+    which it has been steady while one looked.
     """
 
     __tablename__ = "store"
@@ -439,4 +439,3 @@ class StoreRow(Base):
     webhook_entry_id: Mapped[int | None]
     clock_seen_at: Mapped[datetime | None]
     clock_steady_seconds: Mapped[float | None]
-    clock_log_number: Mapped[int | None]

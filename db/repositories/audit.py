@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from db.paging import Window, windowed
 from db.records import Actor, AuditAction, AuditEntry, AuditFilter
-from db.tables import AuditEntryRow
+from db.tables import AuditEntryRow, now
 
 SERVICE = Actor("service")
 """Who does what nobody asked for: retention, and what a check of the stored files finds."""
@@ -59,11 +59,15 @@ def count_of_service(session: Session, action: AuditAction) -> int:
 
 
 def delete_before(session: Session, moment: datetime) -> int:
-    """Delete the entries from before a moment, at least 30 days ago, and record that; returns how many."""
-    old = AuditEntryRow.at < moment
-    count = int(session.scalar(select(func.count()).where(old)) or 0)
+    """Delete the entries from before a moment, at least 30 days ago, and record that; returns how many.
+
+    They go up to the first from after that moment, as ids tell: what follows it was made while the clock was behind.
+    """
+    since = select(func.min(AuditEntryRow.id)).where(AuditEntryRow.at.between(moment, now())).scalar_subquery()
+    old = (AuditEntryRow.at < moment, AuditEntryRow.id < since)
+    count = int(session.scalar(select(func.count()).where(*old)) or 0)
     if count:
-        session.execute(delete(AuditEntryRow).where(old))
+        session.execute(delete(AuditEntryRow).where(*old))
         add(session, SERVICE, "audit.deleted", "audit", {"before": moment.isoformat(), "entries": count})
     return count
 

@@ -48,14 +48,14 @@ def seen_clock(session: Session) -> SeenClock | None:
     row = session.scalar(select(StoreRow))
     if row is None or row.clock_seen_at is None:
         return None
-    return SeenClock(row.clock_seen_at, row.clock_steady_seconds or 0.0, row.clock_log_number or 0)
+    return SeenClock(row.clock_seen_at, row.clock_steady_seconds or 0.0)
 
 
 def note_clock(session: Session, seen: SeenClock) -> None:
-    """Note how the clock was seen."""
-    at, steady, number = seen
-    noted = {"clock_seen_at": at, "clock_steady_seconds": steady, "clock_log_number": number}
-    session.execute(update(StoreRow).values(noted))
+    """Note how the clock was seen. Raises ``StorageUnavailable`` where the database has no store id."""
+    noted = update(StoreRow).values(clock_seen_at=seen.at, clock_steady_seconds=seen.steady)
+    if session.scalar(noted.returning(StoreRow.number)) is None:
+        raise StorageUnavailable("the database has no store id, beside which the clock is noted; allowed: a restart")
 
 
 def touch(session: Session) -> None:

@@ -6,9 +6,10 @@ content is done by one at a time (``lock``): an upload that brings a file back, 
 """
 
 from collections.abc import Collection, Iterable
-from datetime import datetime
+from datetime import datetime, timedelta
+from typing import Any
 
-from sqlalchemy import ColumnElement, Select, and_, exists, func, select, text, update
+from sqlalchemy import ColumnElement, Interval, Select, and_, exists, func, literal, select, text, update
 from sqlalchemy.orm import Session, aliased
 
 from db.repositories import blobs
@@ -39,16 +40,24 @@ def newest(session: Session) -> datetime | None:
     return session.scalar(select(func.max(GraspLogRow.created_at)))
 
 
-def newest_number(session: Session) -> int:
-    """The number of the log that came in last; 0 where none is."""
-    return session.scalar(select(func.max(GraspLogRow.number))) or 0
+def follow_clock(session: Session, at: datetime, jump: timedelta) -> None:
+    """Let no file be older by a clock that has jumped to ``at``: all go ahead with it, but none is newer than that."""
+    ahead, since = max(jump, timedelta()), GraspLogRow.file_since
+    _set_since(session, since > at - ahead, at)
+    if not ahead:
+        return
+    if session.connection().dialect.name == "postgresql":
+        _set_since(session, since <= at - ahead, since + literal(ahead, Interval()))
+    else:
+        later = func.strftime("%Y-%m-%d %H:%M:%f000", since, f"{ahead.total_seconds():.3f} seconds")
+        _set_since(session, since <= at - ahead, later)
 
 
-def count_as_new(session: Session, number: int, at: datetime) -> None:
-    """Let files of logs that came in after this number be as old as of then, at most."""
-    since_then = (GraspLogRow.number > number, GraspLogRow.file_since < at, GraspLogRow.file_state.is_(None))
-    counted = update(GraspLogRow).where(*since_then).values(file_since=at)
-    session.execute(counted.execution_options(synchronize_session=False))
+def _set_since(session: Session, those: ColumnElement[bool], since: datetime | ColumnElement[Any]) -> None:
+    of = (those, GraspLogRow.file_state.is_(None))
+    session.execute(
+        update(GraspLogRow).where(*of).values(file_since=since).execution_options(synchronize_session=False)
+    )
 
 
 def count_old(session: Session, before: datetime) -> tuple[int, int]:

@@ -12,10 +12,9 @@ depends_on = None
 def upgrade() -> None:
     op.add_column("store", sa.Column("clock_seen_at", sa.DateTime(timezone=True), nullable=True))
     op.add_column("store", sa.Column("clock_steady_seconds", sa.Double(), nullable=True))
-    op.add_column("store", sa.Column("clock_log_number", sa.Integer(), nullable=True))
 
 
 def downgrade() -> None:
     with op.batch_alter_table("store") as table:
-        for name in ("clock_log_number", "clock_steady_seconds", "clock_seen_at"):
+        for name in ("clock_steady_seconds", "clock_seen_at"):
             table.drop_column(name)

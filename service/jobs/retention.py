@@ -92,10 +92,9 @@ class Retention:
         self._thread = PeriodicThread("retention", LOOK_SECONDS, self._look)
 
     def start(self) -> None:
-        """Begin, where something is to be kept for some days only."""
-        if any(age is not None for age in (self._age, self._grace, self._audit_age)):
-            self._look_at_the_clock()  # before anything is stored by it
-            self._thread.start()
+        """Begin, also where all is kept for good: the webhook and the command go by whether the clock was watched."""
+        self._look_at_the_clock()  # before anything is stored by it
+        self._thread.start()
 
     async def stop(self) -> None:
         """End after the files that are being deleted."""
@@ -103,7 +102,10 @@ class Retention:
 
     def _look(self) -> None:
         try:
-            if not self._leads() or not self._clock.is_believed():
+            if not self._leads():
+                self._clock = SteadyClock(self._database)  # others look meanwhile, so that an own look is not the last
+                return
+            if not self._clock.is_believed():
                 return
             if self._age is not None:
                 self._prune(self._age)

@@ -33,7 +33,7 @@ class SteadyClock:
     """Compares the clock with the one that nobody sets, at each look; the database remembers over restarts for how long
     it was steady.
 
-    What was stored since it last jumped is of an unknown age once it jumps again, and counts as new.
+    Uploads go with it as it jumps ahead, since it may be right only now: none is older by that.
     """
 
     def __init__(self, database: Database) -> None:
@@ -48,30 +48,31 @@ class SteadyClock:
         look = Look(moment, at.timestamp() - moment)
         with self._database.write(durable=False) as session:
             seen = stores.seen_clock(session)
-            if seen is None or self._has_jumped(seen, look, at):
-                seen = self._begin(session, seen, at)
+            if seen is None:
+                seen = SeenClock(at, 0.0)
+            elif (jump := self._jump(seen, look, at)) is not None:
+                logger.warning("the clock has jumped by %s: nothing is deleted by its age for %s", jump, STEADY)
+                uploads.follow_clock(session, at, jump)
+                seen = SeenClock(at, 0.0)
             else:
                 seen = seen._replace(at=at, steady=seen.steady + self._passed(seen, look, at))
             stores.note_clock(session, seen)
         self._last = look
         return seen.steady >= STEADY.total_seconds()
 
-    def _has_jumped(self, seen: SeenClock, look: Look, at: datetime) -> bool:
+    def _jump(self, seen: SeenClock, look: Look, at: datetime) -> timedelta | None:
+        """By how much it is further than it would be; at a first look at least that. None where it is steady."""
         if self._last is None:
-            return not -JUMP <= at - seen.at <= STEADY
-        return abs(look.ahead - self._last.ahead) > JUMP.total_seconds()
+            jump = at - seen.at
+            return None if -JUMP <= jump <= STEADY else jump
+        jump = timedelta(seconds=look.ahead - self._last.ahead)
+        return jump if abs(jump) > JUMP else None
 
     def _passed(self, seen: SeenClock, look: Look, at: datetime) -> float:
         """Seconds since somebody, here or in another process, looked."""
         if self._last is None:
             return 0.0
         return max(0.0, min(look.moment - self._last.moment, (at - seen.at).total_seconds()))
-
-    def _begin(self, session: Session, seen: SeenClock | None, at: datetime) -> SeenClock:
-        logger.warning("the clock says %s, which may be wrong: nothing is deleted for %s", at.isoformat(), STEADY)
-        if seen is not None:
-            uploads.count_as_new(session, seen.log_number, at)
-        return SeenClock(at, 0.0, uploads.newest_number(session))
 
 
 def doubt(session: Session) -> str | None:
@@ -80,7 +81,8 @@ def doubt(session: Session) -> str | None:
     if seen is not None:
         if not -JUMP <= at - seen.at <= STEADY:
             return f"{at.isoformat()}, and a server last saw {seen.at.isoformat()}"
-        return None if seen.steady >= STEADY.total_seconds() else f"{at.isoformat()}, and has jumped lately"
+        watched = seen.steady >= STEADY.total_seconds()
+        return None if watched else f"{at.isoformat()}, and has been watched for less than a day"
     newest = uploads.newest(session)
     if newest is None or abs(at - newest) <= STEADY:
         return None

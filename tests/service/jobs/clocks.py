@@ -12,4 +12,4 @@ def vouch_for_the_clock(database: Database) -> None:
     with database.write() as session:
         if stores.find_id(session) is None:
             stores.set_id(session, "1" * 32)
-        stores.note_clock(session, SeenClock(now(), STEADY.total_seconds(), 0))
+        stores.note_clock(session, SeenClock(now(), STEADY.total_seconds()))

@@ -27,6 +27,7 @@ from service.jobs.retention import Retention, prune
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client.container import encode
+from tests.service.jobs import clocks as clocks_of_tests
 from tests.service.jobs.clocks import vouch_for_the_clock
 from tests.waiting import wait_until
 
@@ -351,7 +352,7 @@ def test_nothing_is_deleted_by_a_clock_that_jumps(
 
 def test_old_entries_of_the_audit_trail_are_deleted_where_that_is_set(database: Database, blobs: BlobStore) -> None:
     with database.write() as session:
-        for days in (29, 31):
+        for days in (31, 29):
             entry = AuditEntryRow(at=now() - timedelta(days=days), actor="service", action="x", subject="y", details={})
             session.add(entry)
     vouch_for_the_clock(database)
@@ -361,3 +362,53 @@ def test_old_entries_of_the_audit_trail_are_deleted_where_that_is_set(database: 
             found = audit.list_all(session, Window("id"), AuditFilter())
         assert len(found) == left
     assert found[-1].action == "audit.deleted"
+
+
+def test_an_entry_made_while_the_clock_was_behind_stays(database: Database) -> None:
+    """It had gone a day after the clock was right again."""
+    with database.write() as session:
+        for subject, days in (("first", 500), ("near", 50), ("behind", 400), ("ahead", -3650), ("last", 1)):
+            at = now() - timedelta(days=days)
+            session.add(AuditEntryRow(at=at, actor="service", action="x", subject=subject, details={}))
+            session.flush()
+        assert audit.delete_before(session, now() - timedelta(days=365)) == 1
+        assert audit.delete_before(session, now() - timedelta(days=30)) == 2
+        left = audit.list_all(session, Window("id"), AuditFilter(action="x"))
+    assert sorted(entry.subject for entry in left) == ["ahead", "last"]
+
+
+def test_whoever_leads_looks_at_the_clock_also_where_all_is_kept(
+    database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a webhook's entry that was refused for good stopped all others, once retention had been on."""
+    vouch_for_the_clock(database)
+    for module in (retention, steady_clock):
+        monkeypatch.setattr(module, "now", lambda: now() + timedelta(days=30))
+    kept = Retention(database, blobs, None, lambda: True)
+    monkeypatch.setattr(kept._thread, "start", lambda: started.append(True))
+    started: list[bool] = []
+    with database.read() as session:
+        assert "a server last saw" in (steady_clock.doubt(session) or "")
+    kept.start()
+    kept._look()
+    with database.read() as session:
+        assert "has been watched for less than a day" in (steady_clock.doubt(session) or "")
+    assert started
+
+
+def test_a_process_that_comes_to_lead_does_not_go_by_its_look_of_before(
+    database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock had jumped meanwhile, which another one had seen: it was steady for a day since."""
+    leading = [False]
+    later = Retention(database, blobs, None, lambda: leading[0])
+    vouch_for_the_clock(database)
+    later._look_at_the_clock()
+    later._look()
+    for module in (retention, steady_clock, clocks_of_tests):
+        monkeypatch.setattr(module, "now", lambda: now() + timedelta(hours=3))
+    vouch_for_the_clock(database)
+    leading[0] = True
+    later._look()
+    with database.read() as session:
+        assert steady_clock.doubt(session) is None

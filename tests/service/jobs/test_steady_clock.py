@@ -4,8 +4,9 @@ import pytest
 from sqlalchemy import select, update
 
 from db.database import Database
+from db.errors import StorageUnavailable
 from db.records import NewGraspLog
-from db.repositories import grasp_logs, stores
+from db.repositories import grasp_logs, stores, uploads
 from db.tables import GraspLogRow
 from service.jobs import steady_clock
 from service.jobs.steady_clock import STEADY, SteadyClock, doubt
@@ -133,7 +134,7 @@ def test_time_without_a_look_does_not_count(store: Database, clocks: Clocks) -> 
     assert not SteadyClock(store).is_believed()
 
 
-def test_what_came_in_by_a_clock_that_was_behind_counts_as_new(store: Database, clocks: Clocks) -> None:
+def test_what_came_in_by_a_clock_that_was_behind_is_no_older_once_it_is_right(store: Database, clocks: Clocks) -> None:
     """It had been deleted minutes after the clock was set, or a day after."""
     clock = believed(SteadyClock(store), clocks)
     before = log_of(store, clocks)
@@ -143,7 +144,7 @@ def test_what_came_in_by_a_clock_that_was_behind_counts_as_new(store: Database, 
     behind = log_of(store, clocks)
     clocks.go(LOOK, timedelta(days=200))
     clock.is_believed()
-    assert since(store, behind) == clocks.wall
+    assert clocks.wall - since(store, behind) == LOOK
     assert abs(since(store, before) - at) <= 3 * LOOK
 
 
@@ -153,6 +154,79 @@ def test_what_came_in_before_the_first_look_at_a_new_clock_counts_as_new(store: 
     clocks.go(LOOK, timedelta(days=200))
     SteadyClock(store).is_believed()
     assert since(store, log) == clocks.wall
+
+
+def look(clock: SteadyClock, clocks: Clocks, by: timedelta) -> None:
+    """The next look at a clock that has been set."""
+    clocks.go(LOOK, by)
+    assert not clock.is_believed()
+
+
+def test_what_came_in_before_the_look_that_sees_the_jump_is_not_older_by_it(store: Database, clocks: Clocks) -> None:
+    clock = believed(SteadyClock(store), clocks)
+    clocks.go(LOOK / 2, timedelta(days=-200))
+    log = log_of(store, clocks)
+    clocks.go(LOOK / 2)
+    assert not clock.is_believed()
+    look(clock, clocks, timedelta(days=200))
+    assert clocks.wall - since(store, log) == 3 / 2 * LOOK
+
+
+def test_a_file_brought_back_while_the_clock_was_behind_is_not_older_by_it(
+    store: Database, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "now", clocks.now)
+    clock = believed(SteadyClock(store), clocks)
+    log = log_of(store, clocks)
+    with store.write() as session:
+        session.execute(update(GraspLogRow).values(file_state="gone"))
+    look(clock, clocks, timedelta(days=-200))
+    with store.write() as session:
+        assert uploads.bring_back(session, session.scalars(select(GraspLogRow.sha256)).one())
+    look(clock, clocks, timedelta(days=200))
+    assert clocks.wall - since(store, log) == LOOK
+
+
+def test_a_clock_that_is_set_right_in_steps_makes_no_file_older(store: Database, clocks: Clocks) -> None:
+    clock = believed(SteadyClock(store), clocks)
+    look(clock, clocks, timedelta(days=-200))
+    log = log_of(store, clocks)
+    for days in (90, 3, 7, 100):
+        clocks.go(STEADY + LOOK)
+        clock.is_believed()
+        look(clock, clocks, timedelta(days=days))
+    age = 4 * (STEADY + 2 * LOOK)
+    assert timedelta() <= clocks.wall - since(store, log) <= age
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+def test_a_clock_that_was_ahead_keeps_no_file_for_longer_than_a_new_one(
+    store: Database, clocks: Clocks, *, restarted: bool
+) -> None:
+    """For ten years it had, or for good."""
+    clock = believed(SteadyClock(store), clocks)
+    before = log_of(store, clocks)
+    look(SteadyClock(store) if restarted else clock, clocks, timedelta(days=3650))
+    ahead = log_of(store, clocks)
+    look(SteadyClock(store) if restarted else clock, clocks, timedelta(days=-3650))
+    assert [since(store, log) for log in (before, ahead)] == [clocks.wall] * 2
+
+
+def test_a_clock_that_jumps_by_little_every_week_lets_files_grow_old(store: Database, clocks: Clocks) -> None:
+    """As that of a machine which stands still while it is saved."""
+    clock = believed(SteadyClock(store), clocks)
+    log, at = log_of(store, clocks), clocks.wall
+    for _ in range(10):
+        clocks.go(timedelta(days=7))
+        clock.is_believed()
+        look(clock, clocks, timedelta(minutes=2))
+    assert abs(since(store, log) - at - 10 * timedelta(minutes=2)) < timedelta(seconds=1)
+
+
+def test_a_database_without_a_store_id_is_not_looked_at_in_vain(database: Database, clocks: Clocks) -> None:
+    del clocks
+    with pytest.raises(StorageUnavailable, match="no store id"):
+        SteadyClock(database).is_believed()
 
 
 def doubts(store: Database) -> str:
@@ -167,7 +241,7 @@ def test_a_command_doubts_a_clock_that_no_server_vouches_for(store: Database, cl
     assert "the newest log is of 2026-11-26" in doubts(store)
     clock = SteadyClock(store)
     clock.is_believed()
-    assert "has jumped lately" in doubts(store)
+    assert "has been watched for less than a day" in doubts(store)
     clocks.go(STEADY)
     clock.is_believed()
     assert not doubts(store)

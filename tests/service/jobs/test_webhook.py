@@ -190,7 +190,7 @@ def test_nothing_is_given_up_by_a_clock_that_may_be_wrong(stored: Database, rece
     sender = hook(stored, receiver)
     found(stored, "paper", age=8 * 86400.0)
     with stored.write() as session:
-        stores.note_clock(session, SeenClock(now() - timedelta(days=30), 1e6, 0))
+        stores.note_clock(session, SeenClock(now() - timedelta(days=30), 1e6))
     assert sender.send_new() == 1
 
 
