@@ -28,7 +28,7 @@ def with_others_calibrations(model: "FrictionModel", findings: Sequence[Collecti
 
 def with_unchecked(model: "FrictionModel", checked: Sequence[bool]) -> "FrictionModel":
     """The model with a note among its diagnostics where an older version did not look at some logs as this one does."""
-    told = "stored before logs were checked: what is sent again is looked at"
+    told = "stored before logs were checked as now: what is sent again is looked at"
     return _counted(model, UNCHECKED, [not each for each in checked], "was", "were", told)
 
 

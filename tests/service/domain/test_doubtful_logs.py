@@ -55,5 +55,5 @@ def test_logs_that_others_calibrations_correct_are_counted() -> None:
 )
 def test_logs_that_were_not_checked_are_counted(checked: list[bool], told: str) -> None:
     (note,) = notes(with_unchecked(MODEL, checked).diagnostics)
-    assert note == f"{told} stored before logs were checked: what is sent again is looked at"
+    assert note == f"{told} stored before logs were checked as now: what is sent again is looked at"
     assert with_unchecked(MODEL, [True, True]) is MODEL
