@@ -285,9 +285,9 @@ class SeenClock(NamedTuple):
 
 
 class Signature(NamedTuple):
-    """By which the grasp of a log is known again, and the fingerprint that all logs of that grasp have."""
+    """By which the grasp of a log is known again, and which log it is, by its id or fingerprint."""
 
-    fingerprint: str
+    log: str
     content: bytes
 
 

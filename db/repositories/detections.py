@@ -98,11 +98,26 @@ def known_again(session: Session, log_id: str, most: int) -> list[str]:
 
 def signatures(session: Session, log_ids: Collection[str]) -> Iterator[Signature]:
     """Those of these logs, newest first, one at a time."""
-    query = select(DetectionRow.fingerprint, DetectionRow.signature).join(GraspLogRow)
+    query = select(DetectionRow.grasp_log_id, DetectionRow.signature).join(GraspLogRow)
     ordered = query.where(GraspLogRow.id.in_(log_ids)).order_by(*_NEWEST_FIRST)
     with session.execute(ordered.execution_options(yield_per=10)) as rows:  # which may be left before their end
         for row in rows:
-            yield Signature(row.fingerprint or "", row.signature or b"")
+            yield Signature(row.grasp_log_id, row.signature or b"")
+
+
+def fingerprints(session: Session, log_ids: Collection[str]) -> list[str]:
+    """Those of these logs, oldest first."""
+    query = select(DetectionRow.fingerprint).join(GraspLogRow).order_by(GraspLogRow.number, GraspLogRow.id)
+    found = session.scalars(query.where(GraspLogRow.id.in_(log_ids), DetectionRow.fingerprint.is_not(None)))
+    return [each for each in found if each is not None]
+
+
+def set_fingerprint(session: Session, material_id: int, before: Collection[str], fingerprint: str) -> bool:
+    """Give all logs of a material with the fingerprints ``before`` this one; whether there are any."""
+    of_material = select(GraspLogRow.id).where(GraspLogRow.material_id == material_id)
+    theirs = (DetectionRow.grasp_log_id.in_(of_material), DetectionRow.fingerprint.in_(before))
+    changed = update(DetectionRow).where(*theirs).values(fingerprint=fingerprint)
+    return bool(session.scalars(changed.returning(DetectionRow.grasp_log_id)).all())
 
 
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
@@ -122,14 +137,30 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
 def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     """Contents of the same grasp as another that has more samples, or as many and was sent earlier; by the content of
     that one.
+
+    A content may have several fingerprints, by several detectors or from merged materials: they are of one grasp.
     """
-    counts: dict[str, dict[str, int]] = {}  # of each content, by fingerprint, in the order in which they were sent
+    counts: dict[str, int] = {}  # of each content, as it was sent last
+    marks: dict[str, str] = {}  # the first fingerprint of each, in the order in which they were sent
+    joined: dict[str, str] = {}  # fingerprints, by others of the same grasp
+
+    def grasp(mark: str) -> str:
+        while mark in joined:
+            mark = joined[mark]
+        return mark
+
     for row in sorted(rows, key=lambda row: (row.number, row.id)):
+        counts[row.sha256] = row.samples
         if row.fingerprint is not None:
-            counts.setdefault(row.fingerprint, {})[row.sha256] = row.samples
-    most = [max(found, key=lambda content: found[content]) for found in counts.values()]
-    groups = zip(most, counts.values(), strict=True)
-    return {counted: [each for each in found if each != counted] for counted, found in groups if len(found) > 1}
+            of_content, own = grasp(marks.setdefault(row.sha256, row.fingerprint)), grasp(row.fingerprint)
+            if own != of_content:
+                joined[own] = of_content
+    groups: dict[str, list[str]] = {}
+    for content, mark in marks.items():
+        groups.setdefault(grasp(mark), []).append(content)
+    most = [max(found, key=lambda content: counts[content]) for found in groups.values()]
+    chosen = zip(most, groups.values(), strict=True)
+    return {counted: [each for each in found if each != counted] for counted, found in chosen if len(found) > 1}
 
 
 def _samples(material_id: int) -> Select[*tuple[Any, ...]]:

@@ -132,12 +132,13 @@ def fit(
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
         log = read_log(path, mapping)
         seen = look(log, detector, sensor_model, gel)
-        return grasps.of(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
+        return grasps.see(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
 
     first = dict[str, Path]()
     copies: dict[str, list[tuple[FrictionSamples, list[Finding]]]] = {}
     looked_at = list(counted(map(found, logs), len(logs), "logs looked at"))
-    for path, (grasp, samples, findings) in zip(logs, looked_at, strict=True):
+    for path, (own, samples, findings) in zip(logs, looked_at, strict=True):
+        grasp = grasps.of(own)
         for finding in (*same_grasp([first[grasp].name] if grasp in first else []), *findings):
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
         first.setdefault(grasp, path)

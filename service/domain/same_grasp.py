@@ -90,39 +90,45 @@ def signature(log: "GraspLog") -> bytes:
     return (OF_DISPLACEMENT if log.force is None else OF_FORCE) + sums.astype("<f4").tobytes()
 
 
-def find_alike(own: bytes, others: Iterable[Signature]) -> Signature | None:
-    """The first of the others that is of the same grasp, as far as they are compared."""
+def find_alike(own: bytes, others: Iterable[Signature]) -> list[str]:
+    """Those of the other logs that are of the same grasp, as far as they are compared; parts of it may not be alike."""
     if not own:  # nothing touched
-        return None
-    mine, compared = Sums(own), 0
+        return []
+    mine, compared, alike = Sums(own), 0, list[str]()
     for other in others:
         theirs = Sums(other.content)
         compared += len(theirs.frames)
         if compared > MOST_COMPARED:
-            return None
+            break
         if mine.are_alike(theirs):
-            return other
-    return None
+            alike.append(other.log)
+    return alike
 
 
 class Grasps:
     """Tells the grasps of logs apart, by comparing each with ``MOST_LOGS`` before it."""
 
     def __init__(self) -> None:
-        self._of_copies: dict[str, str] = {}
+        self._grasps: dict[str, str] = {}
         self._newest_first: deque[Signature] = deque(maxlen=MOST_LOGS)
 
-    def of(self, log: "GraspLog", *, is_touched: bool) -> str:
-        """The fingerprint of the first log of the same grasp."""
-        own, content = fingerprint(log), signature(log) if is_touched else b""
-        if own in self._of_copies:
-            return self._of_copies[own]
-        alike = find_alike(content, self._newest_first)
-        grasp = alike.fingerprint if alike else own
-        self._of_copies[own] = grasp
+    def see(self, log: "GraspLog", *, is_touched: bool) -> str:
+        """Compare a log with those before it; its fingerprint."""
+        own = fingerprint(log)
+        if own in self._grasps:
+            return own
+        content = signature(log) if is_touched else b""
+        alike = [self._grasps[each] for each in find_alike(content, self._newest_first)]
+        self._grasps[own] = alike[-1] if alike else own
+        if len(set(alike)) > 1:  # parts of it had been taken for grasps of their own
+            self._grasps = {each: alike[-1] if of in alike else of for each, of in self._grasps.items()}
         if content:
-            self._newest_first.appendleft(Signature(grasp, content))
-        return grasp
+            self._newest_first.appendleft(Signature(own, content))
+        return own
+
+    def of(self, own: str) -> str:
+        """The grasp of the log with this fingerprint, as far as it is known by now: the same of all logs of one."""
+        return self._grasps[own]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import estimators
 import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
-from db.records import Claim, Detection, Gel, Job, NewModel, SamplesOfLog, SampleSummary, Signature
+from db.records import Claim, Detection, Gel, Job, NewModel, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
@@ -157,7 +157,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         log = formats.read(run.blobs.path(stored.sha256))
         if log.sensor != stored.sensor:  # it was named beside the file
             log = replace(log, sensor=stored.sensor)
-        own = Signature(fingerprint(log), signature(log))
+        own, content = fingerprint(log), signature(log)
     with run.database.read() as session:
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
         gel = sensors.get(session, stored.sensor).gel
@@ -178,33 +178,38 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
-        detection = replace(detection, calibration=correction.version, corrections=correction.changed, gel=gel)
+        detection = replace(
+            detection, calibration=correction.version, corrections=correction.changed, gel=gel, fingerprint=own
+        )
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
-    _store_found(run, log_id, detection, summary, own if history.contact.any() else own._replace(content=b""))
+    _store_found(run, log_id, detection, summary, own, content if history.contact.any() else b"")
     return summary
 
 
-def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSummary, own: Signature) -> None:
-    """Store what was found in a log as that of the grasp that it is of.
+def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSummary, own: str, content: bytes) -> None:
+    """Store what was found in a log, of this fingerprint and signature, as that of the grasp that it is of.
 
-    It is compared while others may write, and once more with what they stored of its material meanwhile.
+    It is compared while others may write, and once more with what they stored of its material meanwhile. Logs that it
+    shows to be of one grasp are of one from then on: parts of it that came before need not be alike.
     """
-    compared, mark = set[str](), own.fingerprint
+    compared, alike = set[str](), list[str]()
     while True:
         with run.timed("samples"), run.database.read() as session:
             others = [each for each in detections.known_again(session, log_id, MOST_LOGS) if each not in compared]
-            alike = find_alike(own.content, detections.signatures(session, others))
+            alike += find_alike(content, detections.signatures(session, others))
         compared.update(others)
-        mark = alike.fingerprint if alike else mark
         with run.database.write() as session:
-            materials_of_logs.hold(session, log_id)
+            material_id = materials_of_logs.hold(session, log_id)
             jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
             if not compared.issuperset(detections.known_again(session, log_id, MOST_LOGS)):
                 continue
+            mark, *joined = dict.fromkeys([*detections.fingerprints(session, alike), own])
+            if material_id and summary.count and detections.set_fingerprint(session, material_id, joined, mark):
+                friction_models.mark_outdated(session, material_id)  # fewer of them count, also without this one
             copied = same_grasp(detections.others_of_grasp(session, log_id, mark))
             findings = (*stored_findings(copied), *(detection.findings or ()))
             found = replace(detection, fingerprint=mark, findings=findings)
-            detections.add(session, log_id, found, summary, own.content)
+            detections.add(session, log_id, found, summary, content)
             jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
             return
 

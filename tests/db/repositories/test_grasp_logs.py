@@ -161,6 +161,42 @@ def test_of_logs_of_one_grasp_the_one_with_the_most_samples_counts(
     assert newest.samples.grasp_log_id == whole
 
 
+def test_grasps_that_share_a_content_are_one(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    """A content in two of them, by two detectors, was the copy of a log that did not count itself."""
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+    stored = [("a", "1", 50), ("x", "1", 100), ("b", "2", 60), ("y", "3", 10), ("x", "2", 55), ("y", "2", 10)]
+    ids = []
+    for content, mark, count in stored:
+        detector = f"detector {len(ids)}"
+        ids.append(add(database, new_log(paper, sha256=content * 64, detector=detector)))
+        found = replace(samples, count=count)
+        with database.write() as session:
+            detections.add(session, ids[-1], replace(detection, fingerprint=mark * 64), found)
+    with database.read() as session:
+        (counted,) = detections.samples_of_material(session, paper)
+        (newest,) = detections.newest_sampled_logs(session, paper, 9)
+    assert (counted.grasp_log_id, counted.copies) == (ids[2], (ids[0], ids[4], ids[5]))  # of x 55 count
+    assert newest.samples.grasp_log_id == ids[2]
+
+
+def test_a_fingerprint_is_set_in_its_material_alone(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    with database.write() as session:
+        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
+    ids = [add(database, new_log(material)) for material in (paper, paper, paper, steel)]
+    with database.write() as session:
+        for number, log_id in reversed(list(enumerate(ids))):
+            detections.add(session, log_id, replace(detection, fingerprint=str(number % 3) * 64), samples)
+        assert detections.fingerprints(session, [ids[2], ids[0]]) == ["0" * 64, "2" * 64]
+        assert detections.set_fingerprint(session, paper, ["0" * 64, "2" * 64], "3" * 64)
+        assert not detections.set_fingerprint(session, paper, ["0" * 64], "3" * 64)
+        assert detections.fingerprints(session, ids) == [mark * 64 for mark in "3130"]
+
+
 def test_logs_without_a_material_are_no_copies_of_each_other(
     database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
 ) -> None:
@@ -186,7 +222,7 @@ def test_signatures_of_the_other_logs_of_a_material_come_newest_first(
         assert detections.known_again(session, ids[0], 9) == [ids[4]]
         assert detections.known_again(session, unassigned, 9) == []
         found = list(detections.signatures(session, [ids[0], ids[4]]))
-        assert found == [Signature("4" * 64, b"4"), Signature("0" * 64, b"0")]
+        assert found == [Signature(ids[4], b"4"), Signature(ids[0], b"0")]
         looked_for = [detections.has_signature(session, log_id) for log_id in ids]
     assert looked_for == [True, False, True, True, True, False]
 

@@ -271,6 +271,20 @@ def test_fit_counts_the_whole_log_where_a_cut_of_it_came_first(run: Run, ramps: 
     assert f"{ramps[0].name}: same grasp: the measurements are those of log cut.npz" in told
 
 
+def test_fit_counts_a_grasp_once_where_the_whole_comes_after_parts(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    log = formats.read(ramps[0])
+    assert log.force is not None
+    log = replace(log, force=log.force + np.random.default_rng(1).normal(0.0, 1e-4, log.force.shape))
+    paths = [tmp_path / f"{name}.npz" for name in ("even", "odd", "whole")]
+    for path, frames in zip(paths, (slice(0, None, 2), slice(1, None, 2), slice(None)), strict=True):
+        container.write(log.take(frames), path)
+    _, alone, _ = run("fit", paths[2], "--method", "ols", "--json")
+    _, parts, _ = run("fit", *paths[:2], "--method", "ols", "--json")
+    _, out, told = run("fit", *paths, "--method", "ols", "--json")
+    assert json.loads(out)["n"] == json.loads(alone)["n"] != json.loads(parts)["n"]
+    assert told.count("same grasp: the measurements are those of log even.npz") == 2
+
+
 def test_fit_says_that_velocities_are_unknown(run: Run, ramps: list[Path], tmp_path: Path) -> None:
     path = tmp_path / "unposed.npz"
     container.write(replace(formats.read(ramps[-1]), object_pose=None), path)

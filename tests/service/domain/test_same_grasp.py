@@ -1,6 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -103,9 +103,14 @@ def test_frames_without_any_load_are_no_grasp(ramp: GraspLog, frames: int) -> No
 def test_no_more_frames_are_compared_than_a_second_allows(ramp: GraspLog, monkeypatch: pytest.MonkeyPatch) -> None:
     own = signature(ramp)
     known = [Signature("a", signature(noisy(ramp, 1))), Signature("b", own)]
-    assert find_alike(own, known) == known[1]
+    assert find_alike(own, known) == ["b"]
     monkeypatch.setattr(same_grasp, "MOST_COMPARED", 2 * len(ramp) - 1)
-    assert find_alike(own, known) is None
+    assert find_alike(own, known) == []
+
+
+def told(grasps: Grasps, log: GraspLog) -> str:
+    """The grasp that a log is of, as told at once."""
+    return grasps.of(grasps.see(log, is_touched=True))
 
 
 def coarse(ramp: GraspLog, seed: int) -> GraspLog:
@@ -123,8 +128,8 @@ def test_grasps_of_few_elements_in_coarse_steps_are_not_taken_for_one(ramp: Gras
     logs = [coarse(ramp, seed) for seed in range(4)]
     assert not any(alike(one, other) for one, other in pairwise(logs))
     grasps = Grasps()
-    assert len({grasps.of(log, is_touched=True) for log in logs}) == 4
-    assert grasps.of(replace(logs[1], time=ramp.time + 1.0), is_touched=True) == fingerprint(logs[1])
+    assert len({told(grasps, log) for log in logs}) == 4
+    assert told(grasps, replace(logs[1], time=ramp.time + 1.0)) == fingerprint(logs[1])
 
 
 def test_the_frames_of_a_log_are_ordered_once_for_all_comparisons(
@@ -139,7 +144,7 @@ def test_the_frames_of_a_log_are_ordered_once_for_all_comparisons(
 
     monkeypatch.setattr("scipy.spatial.cKDTree", noted)
     own, others = noisy(ramp, 0).take(slice(-1)), [noisy(ramp, seed) for seed in range(1, 6)]
-    assert find_alike(signature(own), [Signature("a", signature(other)) for other in others]) is None
+    assert find_alike(signature(own), [Signature("a", signature(other)) for other in others]) == []
     assert sorted(ordered) == [len(own)] + [len(ramp)] * 5
 
 
@@ -149,14 +154,31 @@ def test_grasps_of_files_are_told_apart_by_the_last_of_them(ramp: GraspLog, monk
     logs = [noisy(ramp, seed) for seed in range(3)]
     marks = [fingerprint(log) for log in logs]
     cut = logs[0].take(slice(-1))
-    assert [grasps.of(log, is_touched=True) for log in (*logs[:2], cut, cut, logs[2])] == [
+    assert [told(grasps, log) for log in (*logs[:2], cut, cut, logs[2])] == [
         *marks[:2],
         *marks[:1] * 2,
         marks[2],
     ]
-    assert grasps.of(logs[1].take(slice(-1)), is_touched=True) != marks[1]  # two came since
-    assert grasps.of(logs[1], is_touched=True) == marks[1]
-    assert grasps.of(logs[2].take(slice(-1)), is_touched=False) != marks[2]
+    assert told(grasps, logs[1].take(slice(-1))) != marks[1]  # two came since
+    assert told(grasps, logs[1]) == marks[1]
+    untouched = logs[2].take(slice(-1))
+    assert grasps.of(grasps.see(untouched, is_touched=False)) == fingerprint(untouched)
+
+
+@pytest.mark.parametrize("first", [slice(35), slice(0, None, 2)])
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_parts_of_a_grasp_and_the_whole_are_one_in_any_order(
+    ramp: GraspLog, first: slice, order: tuple[int, ...]
+) -> None:
+    """Where the whole came after both parts, the first part had counted beside it."""
+    whole, other = noisy(ramp, 1), noisy(ramp, 2)
+    rest = np.setdiff1d(np.arange(len(whole)), np.arange(len(whole))[first])
+    second = slice(int(rest[0]), None, int(rest[1] - rest[0]))
+    logs = [whole.take(first), whole.take(second), whole]
+    assert not alike(*logs[:2])
+    grasps = Grasps()
+    seen = [grasps.see(each, is_touched=True) for each in (other, *(logs[place] for place in order), other)]
+    assert [grasps.of(each) for each in seen] == [seen[0], *[seen[1]] * 3, seen[0]]
 
 
 def test_a_note_names_the_copies_and_what_to_do() -> None:

@@ -219,6 +219,50 @@ def test_the_whole_log_counts_where_a_short_cut_of_it_came_first(shop: Shop, con
     assert f"({short} of " in str(whole.diagnostics["same_grasps"])
 
 
+@pytest.mark.parametrize("is_withdrawn", [False, True])
+def test_parts_of_a_grasp_count_once_when_the_whole_shows_it(
+    shop: Shop, content: bytes, ramp: GraspLog, is_withdrawn: bool
+) -> None:
+    """The newest part alone had been taken for the same; a whole log that is put back later is one, too."""
+    even, odd = (ramp.take(slice(begin, None, 2)) for begin in (0, 1))
+    for log in (even, odd):
+        shop.run(shop.ingest(encode(log))[1])
+    shop.run(shop.ingest(another_grasp(content))[1])
+    shop.run(shop.fit("robust"))
+    with shop.database.read() as session:
+        assert len(detections.samples_of_material(session, shop.material_id)) == 3
+    log_id, job = shop.ingest(content)
+    with shop.database.write() as session:
+        if is_withdrawn:
+            grasp_logs.withdraw(session, log_id, "sent by mistake")
+    assert shop.run(job).status == "done"
+    with shop.database.read() as session:
+        parts = detections.samples_of_material(session, shop.material_id)
+    assert sorted(len(part.copies) for part in parts) == [0, 1 if is_withdrawn else 2]
+    assert (log_id in {part.grasp_log_id for part in parts}) == (not is_withdrawn)
+    outdated = {stored.model.method: stored.outdated for stored in shop.material().models}
+    assert outdated == {"hierarchical": False, "ols": False, "robust": True}
+
+
+def test_a_whole_log_without_samples_makes_no_grasps_one(
+    shop: Shop, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its material would not be fitted again."""
+    for begin in (0, 1):
+        shop.run(shop.ingest(encode(ramp.take(slice(begin, None, 2))))[1])
+    collect = pipeline.collect
+
+    def none(*arguments: Any) -> Any:
+        found, _ = collect(*arguments)
+        return found._replace(samples=found.samples.take(slice(0))), "no slip"
+
+    monkeypatch.setattr(pipeline, "collect", none)
+    assert shop.run(shop.ingest(encode(ramp))[1]).status == "refused"
+    with shop.database.read() as session:
+        assert len(detections.samples_of_material(session, shop.material_id)) == 2
+    assert not any(stored.outdated for stored in shop.material().models)
+
+
 def test_a_cut_log_that_is_looked_at_meanwhile_does_not_count_either(
     shop: Shop, content: bytes, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -251,7 +295,7 @@ def test_logs_are_compared_while_others_may_write(
 
     def compare_while_another_stores(*given: Any) -> Any:
         alike = find_alike(*given)
-        found.append(alike is not None)
+        found.append(bool(alike))
         if len(found) == 1:
             shop.run(shop.ingest(content)[1])
         return alike
