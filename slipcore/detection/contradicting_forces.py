@@ -18,6 +18,9 @@ from slipcore.frames import FloatArray, GraspLog
 NORMAL, ALONG, ABOUT = slice(2, 3), slice(0, 2), slice(3, 4)
 """Components of the sums that have a stiffness of their own."""
 
+LATE, EARLY = "late forces", "early forces"
+"""Findings, by whether forces come after or before the displacement that they go with."""
+
 
 class Changes(NamedTuple):
     """How sums over the lattice change from one ``step``, s, to the next: of ``displacement`` m and ``force`` N along
@@ -36,7 +39,7 @@ def agreeing(log: GraspLog) -> tuple[GraspLog, tuple[Finding, ...]]:
     found = []
     if lag := lag_of_forces(changes_of(log)):
         log = brought_forward(log, lag)
-        name, order = ("late forces", "after") if lag > 0.0 else ("early forces", "before")
+        name, order = (LATE, "after") if lag > 0.0 else (EARLY, "before")
         evidence = f"forces come {abs(lag):.2f} s {order} the displacement that they go with"
         remedy = "give both the times at which they were measured"
         found.append(Finding(name, f"{evidence}; slip is found with both at once", remedy))

@@ -18,6 +18,7 @@ from slipcore.checks import AGAINST_FRICTION
 from slipcore.checks.contact import _load_ratio
 from slipcore.checks.subject import Subject
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.detection.contradicting_forces import EARLY, LATE
 from slipcore.finding import SEVERITIES
 from slipcore.surface.log_normals import normals_of
 
@@ -503,6 +504,8 @@ def findings_in_code() -> set[str]:
         path.read_text(encoding="utf-8") for part in ("slipcore", "service") for path in Path(part).rglob("*.py")
     ]
     return {name for source in sources for name in re.findall(r'\bFinding\(\s*"([^"]+)"', source)} | {
+        LATE,
+        EARLY,
         RECONSTRUCTED,
         CONTRADICTED,
         CORRECTED_BY_ANOTHER,

@@ -159,10 +159,9 @@ def test_a_reader_that_hangs_between_two_files_does_not_keep_the_second(
             readers._idle.pop(chosen).timer.cancel()
             assert not await reading._runs(chosen)
         hung.join()
-        return await readers.convert(source, target, "parquet", {}), hung.exitcode
+        return await readers.convert(source, target, "parquet", {})
 
-    description, ended_by = with_readers(60.0, stop_between)
-    assert (description.frames, ended_by) == (len(ramp), -signal.SIGKILL)
+    assert with_readers(60.0, stop_between).frames == len(ramp)
 
 
 def test_a_file_that_is_late_by_the_clock_alone_is_to_come_again(
