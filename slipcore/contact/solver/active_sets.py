@@ -96,10 +96,14 @@ def _mean_under(pressure: FloatArray, displacement: FloatArray, height: FloatArr
 
 @compiled
 def _violation(pressure: FloatArray, gap: FloatArray) -> float:
-    """Largest gap under pressure, or penetration elsewhere."""
+    """Largest gap under pressure, or penetration elsewhere; NaN where a gap is NaN."""
     p, g, worst = pressure.ravel(), gap.ravel(), 0.0
     for i in range(p.size):
-        worst = max(worst, -g[i], g[i] if p[i] > 0.0 else 0.0)
+        size = abs(g[i]) if p[i] > 0.0 else -g[i]
+        if not size <= worst:
+            worst = size
+            if np.isnan(size):
+                break
     return worst
 
 

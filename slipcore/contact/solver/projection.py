@@ -69,7 +69,8 @@ def project(
     [3].
 
     ``arm`` [2, n]: x and y of the cells; ``start``: a guess of the dual, from a projection nearby. ``feasible`` is
-    False where no tractions within the disks have that resultant.
+    False where no tractions within the disks have that resultant. Tractions and imbalance are NaN for points that are
+    not finite or whose squares are not.
     """
     first = np.zeros(3) if start is None else np.where(given, start, 0.0)
     traction = np.empty_like(point)
@@ -95,6 +96,9 @@ def _dual_newton(
     here = Evaluation(traction, np.empty(3), np.empty((3, 3)))
     trial = Evaluation(traction, np.empty(3), np.empty((3, 3)))
     feasible, reach = True, _largest(constraints.radius) + _largest(constraints.point.reshape(-1))
+    if not 2.0 * reach * reach < np.inf:  # its square, too: an infinite one would make the traction 0, not the limit
+        traction[:] = np.nan
+        return motion, np.full(3, np.nan), 0, feasible
     _evaluate(constraints, motion, here)
     iteration = 0
     for iteration in range(max_iterations):  # noqa: B007
@@ -248,11 +252,14 @@ def _taken_up(radius: FloatArray, arm_x: FloatArray, arm_y: FloatArray, motion: 
     return taken
 
 
-@compiled(fastmath=VECTOR | {"nnan"})
+@compiled
 def _largest(field: FloatArray) -> float:
-    """Largest size of the numbers of a flat field."""
+    """Largest size of the numbers of a flat field; NaN where one is NaN."""
     largest = 0.0
     for i in range(field.size):
         size = abs(field[i])
-        largest = size if size > largest else largest
+        if not size <= largest:
+            largest = size
+            if np.isnan(size):
+                break
     return largest

@@ -81,8 +81,8 @@ def solve_tangential(
     ``points``: x and y of the cells [ny, nx] m; ``limit``: μp [ny, nx] Pa, zero outside contact; ``offset``: c above,
     [2, ny, nx] m; ``start``: a guess of the tractions; ``tolerance`` on the residual, relative to the largest limit.
 
-    Raises ``InfeasibleLoad`` outside the limit surface and ``NotConverged`` at ``max_iterations`` or where the
-    tractions miss the load.
+    Raises ``InfeasibleLoad`` outside the limit surface and ``NotConverged`` at ``max_iterations``, where the tractions
+    miss the load, or where a number is not finite or grows beyond what floating point holds.
     """
     if not limit.any():
         return _frictionless(offset, control)
@@ -126,6 +126,8 @@ class _TangentialStep:
             gradient, point = _descend(traction, displacement, self.offset, self.stiffness)
             nearest, _ = self.project(point, keep=True)
             before, residual = residual, _largest_change(traction, nearest) / self.largest
+            if not np.isfinite(residual):
+                raise NotConverged("tangential contact", residual, tolerance, iteration)
             if iteration == 0 and residual > TANGENTIAL.far_start and min(self.limit.shape) >= 2 * TANGENTIAL.coarsest:
                 traction, _ = self.project(self._from_coarse(traction))
                 displacement = self.operator.tangential(traction)
@@ -199,8 +201,10 @@ class _TangentialStep:
         slip = displacement + self.offset - rigid_displacement(self.arm, np.where(self.given, scaled, 0.0))
         lacking = (self.target - resultants(traction, self.arm)) * self.given
         imbalance = float(np.abs(lacking).max()) / self.capacity
-        if imbalance > TANGENTIAL.balance:
+        if not imbalance <= TANGENTIAL.balance:
             raise NotConverged("balance of the tangential load", imbalance, TANGENTIAL.balance, iterations)
+        if not np.isfinite(slip).all():
+            raise NotConverged("slip of the tangential contact", np.nan, residual, iterations)
         slides = lengths(traction - self.stiffness * slip) > self.limit
         return TangentialContact(
             traction,
@@ -247,13 +251,16 @@ def _descend(
     return gradient, point
 
 
-@compiled(fastmath=VECTOR | {"nnan"})
+@compiled
 def _largest_change(before: FloatArray, after: FloatArray) -> float:
-    """Largest difference of two fields."""
+    """Largest difference of two fields; NaN where one is NaN, which is neither larger nor smaller than anything."""
     largest, a, b = 0.0, before.reshape(-1), after.reshape(-1)
     for i in range(a.size):
         size = abs(b[i] - a[i])
-        largest = size if size > largest else largest
+        if not size <= largest:
+            largest = size
+            if np.isnan(size):
+                break
     return largest
 
 
