@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import h5py
 import httpx
 import numpy as np
 import pytest
@@ -744,6 +745,22 @@ def test_a_recording_is_uploaded_with_its_mapping(run: Run, url: str, ramps: lis
     code, _, err = run("upload", path, "--mapping", mapping, "--url", url)
     assert code == INPUT_REFUSED
     assert "mapping is of the unknown 'tim'" in err
+
+
+def test_maps_of_height_are_uploaded_with_their_mapping(run: Run, url: str, ramps: list[Path], tmp_path: Path) -> None:
+    log = formats.read(ramps[0])
+    path, mapping = tmp_path / "log.h5", tmp_path / "mapping.json"
+    with h5py.File(path, "w") as file:
+        file.update({"t": log.time, "u": log.displacement * [1.0, 1.0, 0.0], "x": log.position})
+        file["depth"] = np.zeros((len(log), 40, 40))
+    told = {"time": "t", "displacement": "u", "position": "x", "height": "depth", "pixel": 1e-3}
+    mapping.write_text(json.dumps(told))
+    code, out, _ = run("upload", path, "--mapping", mapping, "--url", url, "--json")
+    assert (code, json.loads(out)["uploads"][0]["status"]) == (0, "done")
+    mapping.write_text(json.dumps(told | {"pixels": [3, 3]}))
+    code, out, _ = run("upload", path, "--mapping", mapping, "--url", url)
+    assert code == SERVICE_REFUSED
+    assert f"height is of shape [{len(log)}, 40, 40]" in out
 
 
 def test_a_lerobot_data_set_is_uploaded_one_log_an_episode(

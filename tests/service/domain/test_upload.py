@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import h5py
 import httpx
 import numpy as np
 import pytest
@@ -203,6 +204,29 @@ def test_a_loggers_table_is_taken_by_its_mapping_with_its_forces(
     with np.load(io.BytesIO(client.get(f"{accepted.headers['location']}/file").content)) as stored:
         np.testing.assert_allclose(stored["force"][3], np.full((2, 2, 3), -1.5), rtol=1e-12, err_msg="as in the table")
     assert upload(client, table, "text/csv").status_code == httpx.codes.UNPROCESSABLE_ENTITY
+
+
+@pytest.mark.parametrize("beside", [{}, {"displacement": "u", "position": "x"}], ids=["alone", "markers"])
+def test_maps_of_height_are_uploaded_with_their_mapping(
+    client: httpx.Client, upload: Upload, wait: Wait, tmp_path: Path, ramp: GraspLog, beside: dict[str, str]
+) -> None:
+    """The log is there either way; slip is looked for where markers show motion along the surface."""
+    level = -1e-4 * np.linspace(0.0, 1.0, len(ramp))
+    flat = ramp.displacement * [1.0, 1.0, 0.0]
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.update({"time": ramp.time, "x": ramp.position, "u": flat - flat[0]})
+        file["depth"] = 1e3 * level[:, None, None] * np.ones((40, 40))
+    mapping = {"time": "time", "height": {"field": "depth", "unit": "mm"}, "pixel": 1e-3, "grid": [5, 8], **beside}
+    content = (tmp_path / "log.h5").read_bytes()
+    accepted = upload(client, content, "application/x-hdf5", mapping=json.dumps(mapping))
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    job = wait(client, accepted.json()["job"]["id"])
+    reason = "displacement is along the normal; allowed: x and y of it"
+    assert (job["status"], (job["reason"] or "")[: len(reason)]) == (("done", "") if beside else ("refused", reason))
+    with np.load(io.BytesIO(client.get(f"{accepted.headers['location']}/file").content)) as stored:
+        z = stored["displacement"][..., 2]
+    assert z.shape[1:] == (ramp.grid if beside else (5, 8))
+    np.testing.assert_allclose(z, np.broadcast_to(level[:, None, None], z.shape), rtol=1e-9, atol=1e-15)
 
 
 def test_slip_is_detected_without_a_scale_but_no_friction_found(
