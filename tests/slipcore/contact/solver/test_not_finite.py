@@ -48,7 +48,7 @@ def test_fields_that_are_infinite_or_overflow_are_an_error(value: float, name: s
     for cells in (np.s_[0, 12, 12], np.s_[:]):
         field = np.zeros((2, *GRID.shape))
         field[cells] = value
-        with pytest.raises(NotConverged, match="residual (nan|inf)"):
+        with pytest.raises(NotConverged, match=r"residual (nan|inf)"):
             solve(control, **{name: field})
 
 
