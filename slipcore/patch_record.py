@@ -20,8 +20,9 @@ class ContactFriction:
     """Friction that follows from the resultants of a contact, with its 95 % interval from ``low`` to ``high``.
 
     ``coefficient``: the median ratio of loads while these stood on the limit surface. Without such a plateau it
-    ``is_bound``: the coefficient is the largest ratio of loads that was held, ``low`` is what friction is at least, and
-    ``high`` is infinite. ``reason``: what it was found from, or why there is no more than a bound.
+    ``is_bound``: the coefficient is the largest ratio of loads that was held, noise and all, ``low`` is what friction
+    is at least, freed of that noise, and ``high`` is infinite. ``reason``: what it was found from, or why there is no
+    more than a bound.
     """
 
     coefficient: float
@@ -40,7 +41,8 @@ class Patch:
     mean speed of the object over the markers; ``regime``: one of ``REGIMES``; ``normal_force`` N,
     ``tangential_force`` [k, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
     bears these, and the standard deviation ``ratio_noise`` that noise of the forces gives it; ``element_force`` N: mean
-    normal force of its elements, weighted by force. Without forces all of these are NaN.
+    normal force of its elements, weighted by force. Without forces all of these are NaN, and ratio and noise where what
+    presses is not beyond noise.
     """
 
     first: int

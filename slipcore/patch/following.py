@@ -15,7 +15,7 @@ from slipcore.patch.plateau import find_plateaus
 from slipcore.patch.pose import lattice_pose
 from slipcore.patch.regimes import regimes
 from slipcore.patch.regions import follow_regions, widened
-from slipcore.patch.resultants import Resultants, resultants
+from slipcore.patch.resultants import Resultants, noise_of_sums, resultants
 from slipcore.patch.spans import Spans, find_spans
 from slipcore.patch_record import Patch
 from slipcore.surface.log_normals import normals_of
@@ -57,11 +57,12 @@ def _resultants(log: GraspLog, spans: Spans, options: PatchOptions) -> Resultant
         frames = len(spans.frame)
         return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(4)))
     wide = spans._replace(labels=widened(spans.labels, options.margin))
-    place, noise = log.position + log.displacement, _force_noise(log.time, log.force)
-    return resultants(log.force, normals_of(log), place, wide, options.kernel_width, noise)
+    fields = log.force, normals_of(log), log.position + log.displacement
+    noise = np.maximum(_force_noise(log.time, log.force), noise_of_sums(log.time, *fields, wide))
+    return resultants(*fields, wide, options.kernel_width, noise)
 
 
 def _force_noise(time: FloatArray, force: FloatArray) -> float:
-    """Standard deviation of a component of the force [t, n, m, 3] N on an element; 0 where too few frames show it."""
+    """Standard deviation of a component of the force [t, n, m, 3] N on an element; 0 where too few show it."""
     noise = estimate_noise(time, np.moveaxis(force, -1, 1).reshape(len(time), 3, -1))
     return float(np.nan_to_num(noise))

@@ -46,8 +46,9 @@ def find_plateaus(
 
     Spin about the normal cannot come from rolling. A patch that travels slides if the force goes along with it, is more
     than rolling resists, and is at its limit most of the way: what rolls travels under any load. Only frames that are
-    ``held`` [k] count.
+    ``held`` [k] and of which the ratio is known count.
     """
+    held = held & np.isfinite(ratio)
     speed = np.nan_to_num(np.hypot(*motion.velocity.T))
     along = np.vecdot(force, motion.velocity) > PATCHES.aligned * np.hypot(*force.T) * speed
     pivots = held & motion.turns & (np.abs(motion.turning) > PATCHES.least_spin * speed)
@@ -90,7 +91,7 @@ def _mark_plateaus(
         begin, end = _next_run(moving, bounds[p], bounds[p + 1])
         while begin < end:
             peak = ratio[begin:end].max()
-            if peak >= (1.0 - flatness.shortfall) * most[p]:
+            if peak > 0.0 and peak >= (1.0 - flatness.shortfall) * most[p]:
                 top = ratio[begin:end] >= (1.0 - flatness.flatness) * peak
                 _mark_flat_parts(time[begin:end], pitches[begin:end], ratio[begin:end], top, flatness, found[begin:end])
             begin, end = _next_run(moving, end, bounds[p + 1])

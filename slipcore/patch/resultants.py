@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.defaults import PATCHES
+from slipcore.defaults import DEVIATION_TO_SIGMA, PATCHES
 from slipcore.frames import FloatArray
 from slipcore.limit_surface import Descent, find_limit_load
+from slipcore.noise import median
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 CLOSE_ENOUGH = Descent(PATCHES.descents, PATCHES.settled, PATCHES.still, PATCHES.rank, PATCHES.free_motion)
@@ -22,8 +23,8 @@ class Resultants(NamedTuple):
     ``normal_force`` N along the patch's mean normal; ``tangential_force`` [k, 2] N across it, the first component
     nearest to x; ``moment`` N·m about it at the centre of pressure; ``load_ratio``: the least friction coefficient that
     bears force and moment, which is that of the patch once all of it slips, and the standard deviation
-    ``ratio_noise`` that noise of the forces gives it; ``element_force`` Σ f_n²/Σ f_n N: mean normal force of an
-    element, weighted by force.
+    ``ratio_noise`` that noise of the forces gives it, both NaN where what presses is not beyond noise;
+    ``element_force`` Σ f_n²/Σ f_n N: mean normal force of an element, weighted by force.
     """
 
     normal_force: FloatArray
@@ -40,19 +41,69 @@ def resultants(
     place: FloatArray,
     spans: Spans,
     kernel_width: float = 0.0,
-    force_noise: float = 0.0,
+    force_noise: FloatArray | float = 0.0,
 ) -> Resultants:
     """Of the force [t, n, m, 3] N on the elements of patches, at ``place`` [t, n, m, 3] m, with outward unit normals
     [t, n, m, 3].
 
     Sums are of signed forces, so that noise around the patch adds nothing to them on average. Forces that a sensor
     smooths over ``kernel_width`` m (standard deviation) reach further out than those that act: their mean square arm is
-    larger by twice the square of it, while F_n, F_T and M stay. ``force_noise`` N of each component on an element.
+    larger by twice the square of it, while F_n, F_T and M stay. ``force_noise`` [k, 2] N on an
+    element, of each component across the normal, and along it; or one for all.
     """
     fields = for_kernels(force), for_kernels(normal), for_kernels(place)
-    sums = np.empty((len(spans.frame), 7))
-    _fill_sums(*fields, spans, kernel_width, force_noise, sums)
+    sums, noise = np.empty((len(spans.frame), 7)), np.broadcast_to(force_noise, (len(spans.frame), 2))
+    _fill_sums(*fields, spans, kernel_width, for_kernels(noise), sums)
     return Resultants(sums[:, 0], sums[:, 1:3], *sums[:, 3:].T)
+
+
+def noise_of_sums(
+    time: FloatArray, force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans
+) -> FloatArray:
+    """Noise [k, 2] N of forces on an element, across the normal and along it, by which the sums of a patch would be as
+    noisy as they are.
+
+    Of F_x, F_y, M and F_n of ``resultants`` each value is compared with the line through those before and after it, at
+    ``time`` [t] s; medians are taken over a patch's frames (those that did not change left out), of the first three the
+    noisiest counts. Noise that elements share or smooth adds up in sums to more than their own shows; that of a patch
+    of few elements shows here alone. 0 where fewer than three frames show it.
+    """
+    loads = np.empty((len(spans.frame), 4))
+    _fill_loads(for_kernels(force), for_kernels(normal), for_kernels(place), spans, loads)
+    noise = np.zeros(loads.shape)
+    _fill_noise(time[spans.frame], spans.bounds, loads, noise)
+    return np.stack([noise[:, :3].max(axis=1), noise[:, 3]], axis=-1)
+
+
+@compiled
+def _fill_loads(force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, loads: FloatArray) -> None:
+    """F_x, F_y, M and F_n [k, 4] of all frames of the patches, each in units of what noise of 1 N would make of it."""
+    for e, k in enumerate(spans.frame):
+        patch = elements_at(spans, e)
+        pressing, arm, load = _felt(force[k], normal[k], place[k], patch)
+        unit, turning = math.sqrt(len(patch)), math.sqrt((arm * arm).sum())
+        loads[e] = math.nan
+        if len(patch) > 0:
+            loads[e, 0], loads[e, 1], loads[e, 3] = load[0] / unit, load[1] / unit, pressing.sum() / unit
+        if turning > 0.0:
+            loads[e, 2] = load[2] / turning
+
+
+@compiled
+def _fill_noise(time: FloatArray, bounds: IntArray, loads: FloatArray, noise: FloatArray) -> None:
+    """Of each of the sums [k, 4], the same for all frames of a patch."""
+    for p in range(len(bounds) - 1):
+        begin, end = bounds[p], bounds[p + 1]
+        for axis in range(loads.shape[1]):
+            residual, count = np.empty(end - begin), 0
+            for e in range(begin + 1, end - 1):
+                share = (time[e] - time[e - 1]) / (time[e + 1] - time[e - 1])
+                off = loads[e, axis] - (1.0 - share) * loads[e - 1, axis] - share * loads[e + 1, axis]
+                if off != 0.0 and math.isfinite(off):
+                    residual[count] = abs(off) / math.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
+                    count += 1
+            if count > 0:
+                noise[begin:end, axis] = DEVIATION_TO_SIGMA * median(residual[:count])
 
 
 @compiled
@@ -62,13 +113,13 @@ def _fill_sums(
     place: FloatArray,
     spans: Spans,
     kernel_width: float,
-    force_noise: float,
+    force_noise: FloatArray,
     sums: FloatArray,
 ) -> None:
     """Of all frames of the patches, [k, 7]."""
     for e, k in enumerate(spans.frame):
         patch = elements_at(spans, e)
-        sums[e] = _of_frame(force[k], normal[k], place[k], patch, kernel_width, force_noise)
+        sums[e] = _of_frame(force[k], normal[k], place[k], patch, kernel_width, force_noise[e])
 
 
 @compiled
@@ -78,63 +129,78 @@ def _of_frame(
     place: FloatArray,
     patch: IntArray,
     kernel_width: float,
-    force_noise: float,
+    force_noise: FloatArray,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Of one frame, in the order of ``Resultants``."""
-    axes = _axes(_mean_normal(force, normal, patch))
-    f, r = _in_axes(force, patch, axes), _in_axes(place, patch, axes)
-    pressing, arm = -f[2], r[:2]
-    total, sideways_x, sideways_y = pressing.sum(), f[0].sum(), f[1].sum()
+    pressing, arm, load = _felt(force, normal, place, patch)
+    total = pressing.sum()
     if not total > 0.0:
         return 0.0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
-    for axis in range(2):
-        arm[axis] -= (pressing * arm[axis]).sum() / total
-    moment = (arm[0] * f[1] - arm[1] * f[0]).sum()
-    mean_square = (pressing * (arm[0] * arm[0] + arm[1] * arm[1])).sum() / total
+    mean_square, shrunk = (pressing * (arm[0] * arm[0] + arm[1] * arm[1])).sum() / total, 1.0
     if mean_square > 0.0:
-        arm *= math.sqrt(max(1.0 - 2.0 * kernel_width**2 / mean_square, _LEAST_SQUARE_ARM))
-    load = np.array([sideways_x, sideways_y, moment])
-    ratio, noise = _load_ratio(pressing, arm, load, force_noise)
-    return total, sideways_x, sideways_y, moment, ratio, (pressing * pressing).sum() / total, noise
+        shrunk = math.sqrt(max(1.0 - 2.0 * kernel_width**2 / mean_square, _LEAST_SQUARE_ARM))
+    ratio, noise = _load_ratio(pressing, arm, shrunk, load, force_noise)
+    return total, load[0], load[1], load[2], ratio, (pressing * pressing).sum() / total, noise
 
 
 @compiled
-def _load_ratio(pressing: FloatArray, arm: FloatArray, load: FloatArray, force_noise: float) -> tuple[float, float]:
-    """The least friction coefficient that bears a load (F_x, F_y, M), and its standard deviation.
+def _felt(
+    force: FloatArray, normal: FloatArray, place: FloatArray, patch: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Normal forces [e] of a frame's elements, their arms [2, e] about the centre of pressure, and the load on the
+    patch: F_x, F_y and M. Arms and load are NaN where nothing presses.
+    """
+    axes = _axes(_mean_normal(force, normal, patch))
+    f, r = _in_axes(force, patch, axes), _in_axes(place, patch, axes)
+    pressing, arm = -f[2], r[:2]
+    total = pressing.sum()
+    if not total > 0.0:
+        return pressing, np.full_like(arm, math.nan), np.full(3, math.nan)
+    for axis in range(2):
+        arm[axis] -= (pressing * arm[axis]).sum() / total
+    return pressing, arm, np.array([f[0].sum(), f[1].sum(), (arm[0] * f[1] - arm[1] * f[0]).sum()])
+
+
+@compiled
+def _load_ratio(
+    pressing: FloatArray, arm: FloatArray, shrunk: float, load: FloatArray, force_noise: FloatArray
+) -> tuple[float, float]:
+    """The least friction coefficient that bears a load (F_x, F_y, M), and its standard deviation; NaN where what
+    presses is not beyond noise. Of the arms [2, e] of the forces, those of what acts are ``shrunk`` by this factor.
 
     In any motion friction has to take up at least what the load does, so that each gives a ratio of both; the largest
     is the answer. A patch of few elements hardly resists a rotation, in which noise of elements around it seems to do
     much: only where the ratio of both is surer than that of the translation along the force is it taken.
     """
-    motion = find_limit_load(pressing, arm, load, np.ones(3, np.bool_), CLOSE_ENOUGH).motion
-    along = np.array([load[0], load[1], 0.0])
+    motion = find_limit_load(pressing, shrunk * arm, load, np.ones(3, np.bool_), CLOSE_ENOUGH).motion
+    along = np.array([load[0], load[1], 0.0]) if load[0] != 0.0 or load[1] != 0.0 else np.array([1.0, 0.0, 0.0])
     (ratio, noise), (shifted, its_noise) = (
-        _ratio_in(motion, pressing, arm, load, force_noise),
-        _ratio_in(along, pressing, arm, load, force_noise),
+        _ratio_in(motion, pressing, arm, shrunk, load, force_noise),
+        _ratio_in(along, pressing, arm, shrunk, load, force_noise),
     )
-    if ratio - _SIGNIFICANT * noise >= shifted - _SIGNIFICANT * its_noise:
+    if math.isnan(shifted) or ratio - _SIGNIFICANT * noise >= shifted - _SIGNIFICANT * its_noise:
         return ratio, noise
     return shifted, its_noise
 
 
 @compiled
 def _ratio_in(
-    motion: FloatArray, pressing: FloatArray, arm: FloatArray, load: FloatArray, force_noise: float
+    motion: FloatArray, pressing: FloatArray, arm: FloatArray, shrunk: float, load: FloatArray, force_noise: FloatArray
 ) -> tuple[float, float]:
     """What a load does in a motion over what friction of coefficient 1 takes up, and the standard deviation of that.
 
-    Both have the noise σ √Σ|B_i d|², of forces across and along the normal. Where friction takes up nothing beyond
-    noise the ratio is at least 0, and that is sure.
+    They have the noise σ √Σ|B_i d|² of forces across the normal, and along it, with the arms at which these are summed.
+    Where friction takes up nothing beyond noise nothing is known: NaN.
     """
     done, taken, square = (motion * load).sum(), 0.0, 0.0
     for i in range(pressing.size):
-        x, y = motion[0] - arm[1, i] * motion[2], motion[1] + arm[0, i] * motion[2]
-        taken += pressing[i] * math.hypot(x, y)
-        square += x * x + y * y
-    noise = force_noise * math.sqrt(square)
-    if not taken > _SIGNIFICANT * noise:
-        return 0.0, 0.0
-    return done / taken, math.hypot(1.0, done / taken) * noise / taken
+        turned_x, turned_y = -arm[1, i] * motion[2], arm[0, i] * motion[2]
+        taken += pressing[i] * math.hypot(motion[0] + shrunk * turned_x, motion[1] + shrunk * turned_y)
+        square += (motion[0] + turned_x) ** 2 + (motion[1] + turned_y) ** 2
+    across, along = force_noise[0] * math.sqrt(square), force_noise[1] * math.sqrt(square)
+    if not taken > _SIGNIFICANT * along:
+        return math.nan, math.nan
+    return done / taken, math.hypot(across, along * done / taken) / taken
 
 
 @compiled

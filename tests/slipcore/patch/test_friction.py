@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from benchmarks.calibration.patch_grasps import PITCH, PIVOT, SLIDE, Setting, grasp, ramp_and_go
 from slipcore import GraspLog, InvalidInput, detect_slip
@@ -61,14 +62,13 @@ ONE_ELEMENT = np.zeros((5, 5), bool)
 ONE_ELEMENT[2, 2] = True
 
 
-def held_by(elements: np.ndarray, share: float, noise: float, seed: int, seconds: float = 2.0) -> ContactFriction:
-    """A load of ``share`` of 0.8 N held by these elements [5, 5] of 3 mm, under noise of all forces, N."""
-    time = np.arange(round(30 * seconds)) / 30.0
-    axis = 3e-3 * np.arange(-2.0, 3.0)
-    position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((5, 5))], axis=-1)
-    force = np.zeros((len(time), 5, 5, 3))
-    force[:, elements] = 0.8 / elements.sum() * np.array([share, 0.0, -1.0])
-    force += noise * np.random.default_rng(seed).standard_normal(force.shape)
+def held_by(elements: np.ndarray, share: float, noise: np.ndarray) -> ContactFriction:
+    """A load of ``share`` of 0.8 N held by these elements [n, m] of 3 mm, under noise [t, n, m, 3] N of all forces."""
+    time = np.arange(len(noise)) / 30.0
+    axes = (3e-3 * (np.arange(length) - 0.5 * (length - 1)) for length in elements.shape)
+    position = np.stack([*np.meshgrid(*axes, indexing="ij"), np.zeros(elements.shape)], axis=-1)
+    force = noise.copy()
+    force[:, elements] += 0.8 / elements.sum() * np.array([share, 0.0, -1.0])
     log = GraspLog(time, position, np.zeros_like(force), 9e-6, force, np.broadcast_to([0.0, 0.0, 1.0], force.shape))
     touching = np.broadcast_to(elements, force.shape[:3])
     found = contact_friction(time, follow_patches(log, touching, np.zeros_like(touching)))
@@ -76,9 +76,14 @@ def held_by(elements: np.ndarray, share: float, noise: float, seed: int, seconds
     return found
 
 
+def white(elements: np.ndarray, noise: float, seed: int, seconds: float = 2.0) -> np.ndarray:
+    """Noise N of forces on these elements [n, m] at 30 Hz: [t, n, m, 3]."""
+    return noise * np.random.default_rng(seed).standard_normal((round(30 * seconds), *elements.shape, 3))
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3, 5e-3])
 def test_noise_around_a_contact_of_one_element_is_no_moment_on_it(noise: float) -> None:
-    found = held_by(ONE_ELEMENT, 0.35, noise, seed=1)
+    found = held_by(ONE_ELEMENT, 0.35, white(ONE_ELEMENT, noise, seed=1))
     assert found.coefficient == pytest.approx(0.35, abs=0.01 + 5.0 * noise)
     assert 0.9 * 0.35 - 25.0 * noise < found.low < 0.35
 
@@ -88,8 +93,27 @@ def test_noise_around_a_contact_of_one_element_is_no_moment_on_it(noise: float) 
 def test_a_bound_lies_above_what_was_held_as_seldom_as_it_says(elements: np.ndarray, seconds: float) -> None:
     """Less the 3 % that resultants err by, which nothing here does: without noise subtracted 20 to 200 would."""
     bare = 1.0 - 1.96 * 0.03
-    lows = [held_by(elements, 0.35, 5e-3, seed, seconds).low / bare for seed in range(200)]
+    lows = [held_by(elements, 0.35, white(elements, 5e-3, seed, seconds)).low / bare for seed in range(200)]
     assert sum(low > 0.35 for low in lows) <= 10, "2.5 % of 200, and three standard deviations of chance"
+    assert np.median(lows) > 0.25
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 3), (2, 2), (5, 5)])
+def test_noise_that_elements_share_is_known_from_the_sums_of_their_forces(shape: tuple[int, int]) -> None:
+    """It drops out of what elements show against each other, and of fewer than four nothing can be said so."""
+    elements = np.ones(shape, bool)
+    one, each = np.ones((1, 1), bool), 0.02 / elements.size
+    shared = [np.broadcast_to(white(one, each, seed), (60, *shape, 3)) for seed in range(100)]
+    lows = [held_by(elements, 0.35, noise).low / (1.0 - 1.96 * 0.03) for noise in shared]
+    assert sum(low > 0.35 for low in lows) <= 5
+    assert np.median(lows) > 0.25
+
+
+def test_noise_that_is_smoothed_over_elements_is_known_from_the_sums_of_their_forces() -> None:
+    elements = np.ones((5, 5), bool)
+    smooth = [gaussian_filter(white(elements, 5e-3, seed), (0.0, 1.2, 1.2, 0.0)) for seed in range(100)]
+    lows = [held_by(elements, 0.35, noise).low / (1.0 - 1.96 * 0.03) for noise in smooth]
+    assert sum(low > 0.35 for low in lows) <= 5
     assert np.median(lows) > 0.25
 
 

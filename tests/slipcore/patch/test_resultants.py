@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slipcore.patch.resultants import Resultants, resultants
+from slipcore.patch.resultants import Resultants, noise_of_sums, resultants
 from tests.slipcore.patch.spans import one_patch
 
 RADIUS, FRICTION = 6e-3, 0.45
@@ -85,3 +85,41 @@ def test_where_nothing_presses_nothing_is_known() -> None:
     )
     assert felt.normal_force[0] == 0.0
     assert np.isnan(felt.load_ratio[0])
+
+
+@pytest.mark.parametrize("load", [(0.0, 0.0), (0.1, 0.0), (0.2, 0.3)])
+def test_what_presses_no_more_than_noise_shows_no_ratio(load: tuple[float, float]) -> None:
+    """A ratio of 0, known surely, had become a friction of 0."""
+    force = np.array([*load, -1.0]) * np.ones((1, 2, 2, 3))
+    place = np.zeros(force.shape)
+    place[..., :2] = 1e-3 * np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0]), axis=-1)
+    spans = one_patch(np.ones((1, 2, 2), bool))
+    felt, drowned = (
+        resultants(force, np.broadcast_to(UP, force.shape), place, spans, force_noise=n) for n in (0.6, 0.7)
+    )
+    assert felt.load_ratio[0] == pytest.approx(np.hypot(*load), rel=1e-3)
+    assert felt.ratio_noise[0] == pytest.approx(0.3 * np.hypot(1.0, felt.load_ratio[0]), rel=1e-3), "0.6 N √4 of 4 N"
+    assert np.isnan([drowned.load_ratio[0], drowned.ratio_noise[0]]).all()
+
+
+def test_the_noise_of_a_smoothed_moment_is_that_of_the_arms_it_is_summed_over() -> None:
+    """Those of what acts are shorter: by them it had been stated half as large."""
+    place = np.zeros((400, 7, 7, 3))
+    place[..., :2] = 1e-3 * np.stack(np.meshgrid(np.arange(-3.0, 4.0), np.arange(-3.0, 4.0)), axis=-1)
+    square = (place[..., 0] ** 2 + place[..., 1] ** 2)[..., None]
+    pressing = np.exp(-square / (2.0 * 1.2e-3**2)) / 4.5
+    turning = np.stack([-place[..., 1], place[..., 0], 0.0 * place[..., 0]], axis=-1) / np.sqrt(square + 1e-12)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(place.shape)
+    force = pressing * (0.5 * turning - UP) + noise
+    spans = one_patch(np.ones((400, 7, 7), bool))
+    felt = resultants(force, np.broadcast_to(UP, force.shape), place, spans, 0.8e-3, 1e-3)
+    assert felt.ratio_noise.mean() == pytest.approx(felt.load_ratio.std(), rel=0.1)
+
+
+def test_noise_of_sums_is_told_apart_across_the_normal_and_along_it() -> None:
+    random, time = np.random.default_rng(1), np.cumsum(np.random.default_rng(2).uniform(0.5, 1.5, 2000))
+    force = np.array([0.3, 0.0, -1.0]) + random.standard_normal((2000, 3, 3, 3)) * np.array([0.01, 0.02, 0.05])
+    place = np.zeros(force.shape)
+    spans = one_patch(np.ones((2000, 3, 3), bool))
+    found = noise_of_sums(time, force, np.broadcast_to(UP, force.shape), place, spans)
+    np.testing.assert_allclose(found[[0, -1]], [[0.02, 0.05]] * 2, rtol=0.1)
