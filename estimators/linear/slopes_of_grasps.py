@@ -54,20 +54,27 @@ def _slopes(within: FloatArray) -> Slopes:
 
 def _times(grasps: Sequence[GraspStatistics], within: FloatArray, found: Slopes, law: FloatArray) -> float:
     """Mean square of what slopes differ by, over that of the samples; 1 where the grasps don't tell."""
-    factor = np.array([_factor(grasp, law) for grasp in grasps])
+    factor = _factors(grasps, law)
     rows, response = (factor[:, None, None] * found.regressors).reshape(-1, 2), found.response.ravel()
     alike, _, rank, _ = np.linalg.lstsq(rows, response, rcond=CLUSTERS.alone)
     slopes, places = int(np.count_nonzero(rows.any(axis=1))), sum(float(grasp.count.sum()) for grasp in grasps)
     samples = sum(grasp.total_weight for grasp in grasps) ** 2 / sum(grasp.weight_square for grasp in grasps)
-    left = float(np.square(within[..., 2]).sum() - response @ response)
-    if slopes <= rank or samples <= places + slopes or left <= (ROUNDING * found.size[2]) ** 2:
+    left = float(np.square(within[..., 2]).sum() - response @ response)  # rounded as squares of this size are
+    if slopes <= rank or samples <= places + slopes or left <= ROUNDING * found.size[2] ** 2:
         return 1.0
     misfit = float(np.square(response - rows @ alike).sum())
     return misfit / (slopes - rank) / (left / (samples - places - slopes))
 
 
-def _factor(grasp: GraspStatistics, law: FloatArray) -> float:
-    """By which the level of a grasp is off the law."""
-    v, f_n, friction = np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count)
-    expected = float(law @ [1.0, v, f_n])
-    return float(friction) / expected if expected else 1.0
+def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> FloatArray:
+    """By which the level of each grasp is off the law; 1 where the law is hardly more than what grasps scatter by.
+
+    A quotient there tells of scatter, not of a factor, and has any size and sign. Where the law is above twice the
+    scatter, levels off by two of its deviations have factors from 0 to 2.
+    """
+    means = np.stack([np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count) for grasp in grasps])
+    expected, friction = law[0] + means[:, :2] @ law[1:], means[:, 2]
+    scatter = np.sqrt(np.square(friction - expected).mean())
+    factors = np.ones(len(means))
+    np.divide(friction, expected, out=factors, where=np.abs(expected) > 2.0 * scatter)
+    return factors

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.estimators.lasting_errors import LAW, SAMPLES, found, grasp
 from estimators.linear.fit_data import gather
 from estimators.linear.grasp_statistics import GraspStatistics
-from estimators.linear.slopes_of_grasps import with_slopes_that_differ
+from estimators.linear.slopes_of_grasps import _factors, with_slopes_that_differ
 from slipcore.samples import FrictionSamples
 
 
@@ -20,9 +20,9 @@ def squares(grasps: list[GraspStatistics]) -> np.ndarray:
     return np.stack([each.within.T @ each.within for each in grasps])
 
 
-def divided_by(grasps: list[GraspStatistics]) -> float:
+def divided_by(grasps: list[GraspStatistics], law: np.ndarray = LAW) -> float:
     """How many times less of slopes samples say."""
-    return float((squares(grasps) / squares(with_slopes_that_differ(grasps, LAW)))[0, 0, 0])
+    return float((squares(grasps) / squares(with_slopes_that_differ(grasps, law)))[0, 0, 0])
 
 
 @pytest.mark.parametrize("places", [1, 2, 3])
@@ -74,3 +74,39 @@ def test_one_grasp_and_grasps_without_error_are_left_as_they_are() -> None:
     for grasps in ([grasp(rng, 3)], [grasp(rng, 3, scatter=0.0, error=0.0) for _ in range(3)]):
         told = statistics(grasps)
         assert with_slopes_that_differ(told, LAW) == told
+
+
+def exact(rng: np.random.Generator, places: int) -> FrictionSamples:
+    """A grasp on the law, with velocities and forces all over its places."""
+    v, f_n, one = rng.uniform(1e-3, 5e-3, 100 * places), rng.uniform(3.0, 7.0, 100 * places), np.ones(100 * places)
+    mu = 0.5 + 4.0 * v - 0.01 * f_n
+    time, place = np.tile(np.arange(100) / 100.0, places), np.repeat(np.arange(places), 100)
+    return FrictionSamples(mu, v, f_n, mu * f_n, time, place, one, 1e-4)
+
+
+@pytest.mark.parametrize("places", [1, 4])
+def test_what_rounding_leaves_is_no_noise_that_slopes_differ_by_more_than(places: int) -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        almost = LAW * [1.0, 1.0 - 1e-6, 1.0]  # as it is fitted beside a prior
+        assert divided_by(statistics([exact(rng, places) for _ in range(12)]), almost) == 1.0
+
+
+def test_a_law_that_falls_to_what_grasps_scatter_by_has_no_factors() -> None:
+    """Grasps that are off by 0.02 whatever their force, at forces from where the law is 0.45 to where it is 0."""
+    rng = np.random.default_rng(0)
+    law, scatter = np.array([0.55, 0.0, -0.05]), 0.02
+    forces = np.linspace(2.0, 11.0, 12)
+    one = statistics([grasp(rng, 3, 0.0, 0.0) for _ in forces])
+    made = [
+        replace(each, mean=np.tile([2e-3, force, law @ [1.0, 2e-3, force] + sign * scatter], (3, 1)))
+        for each, force, sign in zip(one, forces, np.resize([-1.0, 1.0], 12), strict=True)
+    ]
+    factors = _factors(made, law)
+    assert (factors > 0.4).all()
+    assert (factors < 1.6).all()
+    assert factors[-1] == 1.0
+    np.testing.assert_allclose(
+        factors[:3],
+        [1.0 - scatter / 0.45, 1.0 + scatter / (0.45 - 0.05 * 9 / 11), 1.0 - scatter / (0.45 - 0.05 * 18 / 11)],
+    )
