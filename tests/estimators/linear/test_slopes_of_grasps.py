@@ -88,7 +88,7 @@ def exact(rng: np.random.Generator, places: int) -> FrictionSamples:
 def test_what_rounding_leaves_is_no_noise_that_slopes_differ_by_more_than(places: int) -> None:
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        almost = LAW * [1.0, 1.0 - 1e-6, 1.0]  # as it is fitted beside a prior
+        almost = LAW * [1.0, 1.0 - 1e-4, 1.0]  # as it is fitted beside a prior
         assert divided_by(statistics([exact(rng, places) for _ in range(12)]), almost) == 1.0
 
 
