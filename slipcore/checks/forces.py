@@ -16,6 +16,9 @@ from slipcore.frames import BoolArray, FloatArray
 
 ComplexArray = NDArray[np.complex128]
 
+_LARGE_LEAN = np.radians(20.0)
+"""From which on the mean normal is compared; below, it parts from the surface's by what a coarse rim bends, too."""
+
 
 def zero_offset(seen: Subject) -> Iterator[Finding]:
     """Forces where nothing touches: in the frames in which the markers have not moved yet, or no longer are."""
@@ -130,19 +133,24 @@ def _lean(normal: FloatArray, place: FloatArray) -> tuple[float, float]:
     standard deviation of what is left of them; (0, 0) where the places show no surface.
 
     The line to a neighbour is square to the mean of both normals, exactly so on a sphere, a cylinder and a plane,
-    however few elements there are. Of places that are flat under the normals of a dome much is left.
+    however few elements there are. Of places that are flat under the normals of a dome much is left. Of large leans
+    the mean normal tells more, against the plane of the mean lines: a line along the lean is square to normals however
+    they are turned about it.
     """
     upward = _unit(normal.mean(axis=(0, 1)))
-    turns, gaps = list[FloatArray](), list[FloatArray]()
+    turns, gaps, along = list[FloatArray](), list[FloatArray](), list[FloatArray]()
     for axis in (0, 1):
         line = _unit(np.diff(place, axis=axis))
         middle = 0.5 * (np.delete(normal, 0, axis) + np.delete(normal, -1, axis))
         turns.append(np.cross(middle, line).reshape(-1, 3))
         gaps.append(-np.vecdot(middle, line).ravel())
+        along.append(line.mean(axis=(0, 1)))
     turn, gap = np.concatenate(turns), np.concatenate(gaps)
     across = turn - np.outer(turn @ upward, upward)  # turned about themselves normals lean nowhere
     found = np.linalg.lstsq(across, gap, rcond=None)[0]
-    return float(np.linalg.norm(found)), float((gap - across @ found).std())
+    outward, left = _unit(np.cross(along[0], along[1])), float((gap - across @ found).std())
+    direct = float(np.arctan2(np.linalg.norm(np.cross(upward, outward)), abs(upward @ outward)))
+    return (direct if direct > _LARGE_LEAN else float(np.arctan(np.linalg.norm(found)))), left
 
 
 def _unit(vector: FloatArray) -> FloatArray:

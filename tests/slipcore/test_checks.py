@@ -273,7 +273,7 @@ def with_lasting_noise(log: GraspLog, deviation: float, lasts: float) -> GraspLo
 @pytest.mark.parametrize("drift", [0.0, 3e-3])
 def test_what_smoothed_forces_leak_beside_a_contact_is_no_drift(drift: float) -> None:
     """It grows with the contact, to 5 % of its elements' force here, and falls off with the distance."""
-    ramp = tangential_ramp(points=20, pitch=0.75e-3, normal_force=8.0, marker_noise=1e-6, force_noise=0.0)
+    ramp = tangential_ramp(points=26, pitch=0.75e-3, normal_force=8.0, marker_noise=1e-6, force_noise=0.0)
     growing = np.asarray(ramp.force) * np.linspace(0.6, 1.0, len(ramp))[:, None, None, None]
     smoothed = gaussian_filter(growing, (0.0, 3.5, 3.5, 0.0))
     noise = 1e-3 * np.random.default_rng(2).standard_normal(smoothed.shape)
@@ -287,6 +287,13 @@ def test_normals_in_a_frame_that_leans_are_found(long_ramp: GraspLog, degrees: f
     assert "leaning normals" in names(leaning_log)
     assert "leaning normals" in names(leaning_log.take(slice(30, None)))  # also without rest
     assert "leaning normals" not in names(with_leaning_normals(long_ramp, 1.0))
+
+
+@pytest.mark.parametrize("degrees", [-90.0, 15.0, 30.0, 60.0, 90.0])
+def test_a_lean_of_any_size_is_told_by_its_angle(long_ramp: GraspLog, degrees: float) -> None:
+    found = check_log(turned := with_leaning_normals(long_ramp, degrees), detect_slip(turned))
+    (evidence,) = (each.evidence for each in found if each.name == "leaning normals")
+    assert f"lean by {abs(degrees):.1f}°" in evidence
 
 
 def test_normals_of_the_deformed_shape_lean_nowhere(long_ramp: GraspLog) -> None:
