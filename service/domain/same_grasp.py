@@ -40,6 +40,9 @@ LOOKED_AT, LEAST_VALUES = 200, 1000
 ASKED = 64
 """Frames of a log, among those with more than half of its usual largest load, that are looked for in another."""
 
+NEAREST = 16
+"""Frames of the other log that are looked at for each: of a quiet hold all of its thousands are near."""
+
 OF_FORCE, OF_DISPLACEMENT = b"f", b"d"
 """Of which readings a signature is, in its first byte."""
 
@@ -178,11 +181,11 @@ class Sums:
 
     def _share_in(self, other: "Sums", within: "FloatArray") -> float:
         """Share of its frames under load that are among the other's, which may be off by as much in each sum."""
-        found = other._tree.query_ball_point(self._asked / other._widest, 1.0, p=np.inf)
-        near: list[list[int]] = np.asarray(found, object).tolist()
-        asked = np.repeat(np.arange(len(near)), [len(frames) for frames in near])
-        off = np.abs(other.frames[np.concatenate(near).astype(int)] - self._asked[asked])
-        return len(np.unique(asked[(off <= within).all(axis=1)])) / len(near)
+        asked = self._asked / other._widest
+        near = np.asarray(other._tree.query(asked, k=NEAREST, p=np.inf, distance_upper_bound=1.0)[1])
+        frames = np.vstack([other.frames, np.full(SUMS, np.inf)])  # the last where there are no more
+        off = np.abs(frames[near] - self._asked[:, None])
+        return float(np.mean(np.any(np.all(off <= within, axis=2), axis=1)))
 
 
 def _is_distinctive(measured: "FloatArray") -> bool:

@@ -51,24 +51,6 @@ def test_a_key_is_valid_until_the_moment_it_ends_or_is_revoked() -> None:
     assert not keys.is_key(text, NO_KEY)
 
 
-@pytest.mark.parametrize(
-    ("host", "is_own"),
-    [
-        ("127.0.0.1", True),
-        ("127.8.9.1", True),
-        ("::1", True),
-        ("::ffff:127.0.0.1", True),
-        ("localhost", True),
-        ("::ffff:10.0.0.1", False),
-        ("0.0.0.0", False),
-        ("localhost.evil.example", False),
-        ("", False),
-    ],
-)
-def test_this_machine_s_own_addresses_are_known(host: str, is_own: bool) -> None:
-    assert keys.is_loopback(host) is is_own
-
-
 def test_without_keys_only_this_machine_may_be_listened_to(database: Database) -> None:
     for settings in (Settings(access="open", host="0.0.0.0"), Settings(access="auto", host="127.0.0.1")):
         keys.check_start(settings, database)

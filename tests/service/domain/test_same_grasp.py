@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 import estimators
 from db.records import SamplesOfLog, Signature
 from service.domain import same_grasp
-from service.domain.same_grasp import Grasps, Sums, find_alike, fingerprint, signature, with_copies
+from service.domain.same_grasp import OF_FORCE, SUMS, Grasps, Sums, find_alike, fingerprint, signature, with_copies
 from slipcore import GraspLog
 from slipcore.samples import FrictionSamples
 from stiction_client.support import notes
@@ -179,6 +179,17 @@ def test_parts_of_a_grasp_and_the_whole_are_one_in_any_order(
     grasps = Grasps()
     seen = [grasps.see(each, is_touched=True) for each in (other, *(logs[place] for place in order), other)]
     assert [grasps.of(each) for each in seen] == [seen[0], *[seen[1]] * 3, seen[0]]
+
+
+def test_a_quiet_hold_whose_frames_are_all_near_is_known_again_in_its_half() -> None:
+    """Thousands of frames lie within rounding of each other; of each a few are looked at."""
+    steady = np.linspace(0.1, 1.0, SUMS) + 1e-5 * np.random.default_rng(4).standard_normal((5_000, SUMS))
+    whole, half, heavier = (
+        Sums(OF_FORCE + each.astype("<f4").tobytes()) for each in (steady, steady[::2], 1.01 * steady)
+    )
+    assert whole.are_alike(half)
+    assert half.are_alike(whole)
+    assert not whole.are_alike(heavier)
 
 
 def test_a_note_names_the_copies_and_what_to_do() -> None:

@@ -50,6 +50,7 @@ def test_what_is_no_key_has_no_id(text: str) -> None:
         ("192.168.0.7", False),
         ("::ffff:10.0.0.1", False),
         ("localhost.example.org", False),
+        ("localhost.evil.example", False),
         ("", False),
         ("/run/stiction.socket", False),
     ],
