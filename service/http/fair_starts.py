@@ -49,9 +49,9 @@ class FairStarts:
         await begun
 
     async def _wait(self, client: str) -> None:
-        seconds = self._next.get(client, 0.0) - time.monotonic()
-        if seconds > 0.0:
-            await asyncio.sleep(seconds)
+        if (begins := self._next.get(client)) is not None:
+            # without a second left, too: a round of the event loop may have lasted longer than the time to wait
+            await asyncio.sleep(max(begins - time.monotonic(), 0.0))
         if len(self._next) >= MOST_CLIENTS:
             self._next.clear()
 

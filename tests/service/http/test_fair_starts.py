@@ -3,7 +3,8 @@
 import asyncio
 import time
 from contextlib import nullcontext
-from itertools import groupby, pairwise
+from itertools import count, groupby, pairwise
+from types import SimpleNamespace
 
 import pytest
 from starlette.requests import HTTPConnection
@@ -67,6 +68,12 @@ def test_who_has_a_key_does_not_wait_for_others_at_the_same_address() -> None:
     rounds = begun("aaaA")
     assert sorted(rounds[0]) == ["A", "a"]
     assert rounds[1:] == ["a"] * 2
+
+
+def test_a_round_that_lasts_longer_than_the_time_to_wait_begins_no_second_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = count(step=60.0)
+    monkeypatch.setattr("service.http.fair_starts.time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    assert begun("aaa") == ["a"] * 3
 
 
 def test_who_has_gone_begins_nothing_and_holds_nobody_up() -> None:
