@@ -67,6 +67,13 @@ PAGE = 1000
 """Entries asked for at once: as many as the service gives."""
 
 
+ECHOED = {
+    "v": "tangential_velocity",
+    "fn": "normal_force",
+    **{name: name for name in ("quantile", "method", "of", "elements", "element_area")},
+}
+"""Parameters of a look-up that its answer repeats, and as what."""
+
 NOT_MODIFIED = 304
 
 NOT_JSON = (ValueError, RecursionError)
@@ -150,7 +157,9 @@ def upload(
 
 def grasp_log(log_id: str) -> Call[GraspLogReceipt]:
     """Ask for a log."""
-    return _record(GraspLogReceipt.from_json, (yield from _get(f"/v1/grasp-logs/{_part(log_id)}")))
+    found = _record(GraspLogReceipt.from_json, (yield from _get(f"/v1/grasp-logs/{_part(log_id)}")))
+    _require_same({"id": log_id}, found)
+    return found
 
 
 def grasp_logs(material: str | None, limit: int) -> Call[list[GraspLogReceipt]]:
@@ -174,7 +183,7 @@ def ensure_material(name: str, description: str) -> Call[Material]:
 
 def material(name: str) -> Call[Material]:
     """Ask for a material."""
-    return _record(Material.from_json, (yield from _get(f"/v1/materials/{_part(name)}")))
+    return _material(name, (yield from _get(f"/v1/materials/{_part(name)}")))
 
 
 def materials() -> Call[list[Material]]:
@@ -250,7 +259,7 @@ def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:
         return replace(known, asked=asked)
     if known is not None and response.status_code in AWAY:
         raise ConnectionFailed(_summary(response))
-    return CachedModel(_record(Material.from_json, _content(response)), response.headers.get("etag", ""), asked)
+    return CachedModel(_material(name, _content(response)), response.headers.get("etag", ""), asked)
 
 
 def rename_material(name: str, new_name: str) -> Call[Material]:
@@ -280,14 +289,20 @@ def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
 
 def friction(name: str, question: Mapping[str, float | str | None]) -> Call[FrictionAnswer]:
     """Look friction up."""
-    answer = yield from _get(f"/v1/materials/{_part(name)}/friction", _given(**question))
-    return _record(FrictionAnswer.from_json, answer)
+    asked = _given(**question)
+    answer = _record(FrictionAnswer.from_json, (yield from _get(f"/v1/materials/{_part(name)}/friction", asked)))
+    _require_same({ECHOED[each]: value for each, value in asked.items() if each in ECHOED}, answer)
+    yield from _require_named(name, answer.material)
+    return answer
 
 
 def next_grasp(name: str, working_point: Mapping[str, float | str | None]) -> Call[NextGrasp]:
     """Ask what to record next."""
-    answer = yield from _get(f"/v1/materials/{_part(name)}/next-grasp", _given(**working_point))
-    return _record(NextGrasp.from_json, answer)
+    asked = _given(**working_point)
+    answer = _record(NextGrasp.from_json, (yield from _get(f"/v1/materials/{_part(name)}/next-grasp", asked)))
+    _require_same(_given(method=working_point.get("method")), answer)
+    yield from _require_named(name, answer.material)
+    return answer
 
 
 def recognise(grasp: Any, materials: Sequence[str] | None, method: str | None, sensor: str | None) -> Call[Recognition]:
@@ -305,7 +320,7 @@ def fit(name: str, method: str, seed: int) -> Call[Job]:
 
 def job(job_id: str) -> Call[Job]:
     """Ask for a job."""
-    return _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}")))
+    return _job(job_id, (yield from _get(f"/v1/jobs/{_part(job_id)}")))
 
 
 def jobs(status: str | None, limit: int) -> Call[list[Job]]:
@@ -316,7 +331,7 @@ def jobs(status: str | None, limit: int) -> Call[list[Job]]:
 def cancel(job_id: str) -> Call[Job]:
     """Cancel a job, which is harmless twice."""
     request = Request("POST", f"/v1/jobs/{_part(job_id)}/cancel")
-    return _record(Job.from_json, (yield from _ask(request)))
+    return _job(job_id, (yield from _ask(request)))
 
 
 def owners(name: str) -> Call[list[str]]:
@@ -375,7 +390,7 @@ def wait(job_id: str, timeout: float) -> Call[Job]:
         asked = time.monotonic()
         wait_seconds = min(max(deadline - asked, 0.0), LONGEST_POLL)
         request = Request("GET", f"/v1/jobs/{_part(job_id)}", {"wait": wait_seconds}, wait_seconds=wait_seconds)
-        current = _record(Job.from_json, (yield from _ask(request)))
+        current = _job(job_id, (yield from _ask(request)))
         now = time.monotonic()
         if current.ended:
             return current
@@ -476,6 +491,41 @@ def _record(read: Callable[[Any], T], record: Any) -> T:
         return read(record)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise UnexpectedAnswer(f"the service's answer lacks or garbles {error}") from error
+
+
+def _material(name: str, record: Any) -> Material:
+    """The material in an answer, which has to be known by this name: its own, or an alias."""
+    found = _record(Material.from_json, record)
+    if name not in (found.name, *_aliases(record)):
+        _require_same({"name": name}, found)
+    return found
+
+
+def _aliases(record: Mapping[str, Any]) -> list[str]:
+    return _record(lambda known: list(known.get("aliases", ())), record)
+
+
+def _job(job_id: str, record: Any) -> Job:
+    found = _record(Job.from_json, record)
+    _require_same({"id": job_id}, found)
+    return found
+
+
+def _require_named(name: str, answered: str) -> Call[None]:
+    """Ask whether a material that is asked for by ``name`` is the one that was ``answered``, by its own name."""
+    if answered != name:
+        record = yield from _get(f"/v1/materials/{_part(name)}")
+        if answered not in (_material(name, record).name, *_aliases(record)):
+            raise UnexpectedAnswer(f"the answer is to another question: of material {answered!r}, asked {name!r}")
+
+
+def _require_same(asked: Mapping[str, str | float], answer: Any) -> None:
+    """Raise ``UnexpectedAnswer`` where what an answer says it was asked is not what was sent."""
+    for name, value in asked.items():
+        answered = getattr(answer, name)
+        sent = value if isinstance(value, str) else float(str(value))  # as the address has it
+        if answered != sent and (name, value) != ("method", "auto"):
+            raise UnexpectedAnswer(f"the answer is to another question: its {name} is {answered!r}, asked {sent!r}")
 
 
 def _summary(response: httpx.Response) -> str:

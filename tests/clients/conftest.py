@@ -42,6 +42,7 @@ MATERIAL = {
     "description": "80 g/m²",
     "created_at": "2026-11-21T08:41:00Z",
     "grasp_logs": 12,
+    "aliases": ["paper 80.g"],
     "models": {"ols": MODEL},
 }
 JOB = {
