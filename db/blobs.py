@@ -125,6 +125,11 @@ class BlobStore:
         return f"blob folder {self._blobs}" if self._remote is None else f"blob store {self._remote}"
 
     @property
+    def disk(self) -> Path:
+        """A folder on the disk that takes what comes in."""
+        return self._spool
+
+    @property
     def is_remote(self) -> bool:
         """Whether the blobs are in an object store."""
         return self._remote is not None

@@ -76,6 +76,12 @@ class Database:
         return self.engine.dialect.name == "sqlite"
 
     @property
+    def disk(self) -> Path | None:
+        """The folder of the embedded database's file; None of another database."""
+        file = self.engine.url.database if self.is_sqlite else None
+        return None if file is None else Path(file).resolve().parent
+
+    @property
     def is_missing(self) -> bool:
         """Whether there is no file of the embedded database; whoever opens it makes an empty one."""
         return self.is_sqlite and not Path(self.engine.url.database or "").is_file()

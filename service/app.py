@@ -213,7 +213,7 @@ def _background(settings: Settings, database: Database, blobs: BlobStore, runner
     return Background(
         retention,
         Scrub(database, blobs, settings.scrub_bytes_per_second, leads),
-        StoreWatch(database, blobs),
+        StoreWatch(database, blobs, settings.least_free_bytes),
         Webhook(database, settings.webhook_url, settings.webhook_secret, leads),
     )
 

@@ -104,6 +104,10 @@ class Settings(BaseSettings):
     stream_bytes: Annotated[int, Field(ge=MIB, le=2**40)] = Field(
         default=512 * MIB, description="Bytes of frames that all live streams together may hold."
     )
+    least_free_bytes: Annotated[int, Field(ge=0, le=2**50)] = Field(
+        default=256 * MIB,
+        description="Bytes free on the disks of files and of SQLite below which uploads are refused; 0: any.",
+    )
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
     )

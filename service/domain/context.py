@@ -10,6 +10,7 @@ from typing import Protocol
 
 from sqlalchemy.orm import Session
 
+from db import free_room
 from db.blobs import BlobStore
 from db.database import Database
 from service.domain.model_cache import ModelCache
@@ -62,6 +63,10 @@ class Context:
             return [self.blobs.path(sha256, checked_within) for sha256 in hashes]
 
         return await self.store_threads.run(owner, find, is_long=True)
+
+    def require_room(self) -> None:
+        """Make sure that there is room for an upload and what follows from it; raises ``StorageUnavailable``."""
+        free_room.require(self.database, self.blobs, self.settings.least_free_bytes)
 
     @contextmanager
     def queueing(self) -> Iterator[Session]:

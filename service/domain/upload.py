@@ -313,6 +313,7 @@ def _material(session: Session, settings: Settings, received: ReceivedLog) -> in
 
 def _check(context: Context, request: UploadRequest) -> int | None:
     """What can be checked before the bytes are there; returns the material's key, None where there is none yet."""
+    context.require_room()
     if request.detector not in METHOD_NAMES:
         raise InvalidValue("detector", request.detector, ", ".join(METHOD_NAMES))
     if request.sensor is not None:

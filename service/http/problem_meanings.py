@@ -182,7 +182,8 @@ MEANINGS: dict[str, ProblemMeaning] = {
         "Restore it from a backup, or send the same upload again; `stiction db check` lists all that are missing.",
     ),
     "storage-unavailable": ProblemMeaning(
-        "The database or the blob folder cannot be used now: locked, full, gone.",
+        "The database or the blob folder cannot be used now: locked, full or nearly so "
+        "(`STICTION_LEAST_FREE_BYTES`), gone.",
         "Try again after `Retry-After` seconds.",
     ),
     "storage-quota-exceeded": ProblemMeaning(

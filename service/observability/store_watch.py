@@ -2,6 +2,7 @@
 
 import time
 
+from db import free_room
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import DatabaseError
@@ -18,8 +19,8 @@ SHARE_OF_TIME = 0.01
 class StoreWatch:
     """``trouble`` says what was wrong with the stores when they were last looked at; None: nothing."""
 
-    def __init__(self, database: Database, blobs: BlobStore) -> None:
-        self._database, self._blobs = database, blobs
+    def __init__(self, database: Database, blobs: BlobStore, least_free_bytes: int) -> None:
+        self._database, self._blobs, self._least_free_bytes = database, blobs, least_free_bytes
         self.trouble: str | None = None
         self._damage: str | None = None  # of the pages, which are read more seldom
         self._next_pages = 0.0
@@ -43,6 +44,7 @@ class StoreWatch:
                 stores.touch(session)
             self._database.checkpoint()
             self._look_at_pages()
+            free_room.require(self._database, self._blobs, self._least_free_bytes)
         except (DatabaseError, OSError) as error:
             self.trouble = str(error)
         except Exception as error:

@@ -24,6 +24,7 @@ def read_readiness(context: CurrentContext) -> ReadyOut:
     """Tries the database and the blob folder, and waits for the workers' warm-up; the problem names what is missing."""
     context.database.ping()
     context.blobs.ping()
+    context.require_room()
     if context.watch is not None and context.watch.trouble is not None:
         raise storage_unavailable(StorageUnavailable(context.watch.trouble))
     if context.jobs.missing is not None:

@@ -146,6 +146,7 @@ class Fleet:
             "STICTION_LEASE_SECONDS": "2",
             "STICTION_JOB_ATTEMPTS": "10",
             "STICTION_RATE_LIMIT": "0",
+            "STICTION_LEAST_FREE_BYTES": "0",  # full disks are small ones here
         }
 
     def serve(self, server: Server | None = None, *, workers: int = 0) -> Server:

@@ -206,7 +206,7 @@ def test_a_missing_blob_folder_is_told_and_takes_no_upload(
 def test_a_full_disk_of_the_database_is_told(
     database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    watch = StoreWatch(database, blobs)
+    watch = StoreWatch(database, blobs, 0)
     watch.look()
     assert watch.trouble is None
     with database.read() as session:
@@ -227,7 +227,7 @@ def test_a_full_disk_of_the_database_is_told(
 
 def test_what_nobody_thought_of_is_trouble_and_the_watch_goes_on(database: Database, blobs: BlobStore) -> None:
     """As a table that somebody renamed, of which PostgreSQL does not say that it is unavailable."""
-    watch = StoreWatch(database, blobs)
+    watch = StoreWatch(database, blobs, 0)
     with database.write() as session:
         session.connection().exec_driver_sql("ALTER TABLE store RENAME TO away")
     with suppress(DBAPIError):  # the thread logs it, and goes on

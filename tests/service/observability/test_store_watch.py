@@ -15,6 +15,7 @@ from service.observability.store_watch import StoreWatch
 @pytest.fixture
 def database(monkeypatch: pytest.MonkeyPatch) -> Mock:
     monkeypatch.setattr(store_watch, "stores", Mock())
+    monkeypatch.setattr(store_watch, "free_room", Mock())
     return Mock(write=Mock(side_effect=lambda **_: nullcontext()), store_id="s")
 
 
@@ -27,7 +28,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 def test_a_look_asks_both_stores_writes_and_finds_nothing_wrong(database: Mock) -> None:
     blobs: Any = Mock()
-    watch = StoreWatch(database, blobs)
+    watch = StoreWatch(database, blobs, 1000)
     assert watch.trouble is None
     watch.look()
     assert watch.trouble is None
@@ -38,10 +39,11 @@ def test_a_look_asks_both_stores_writes_and_finds_nothing_wrong(database: Mock) 
     store_watch.stores.touch.assert_called_once_with(None)  # type: ignore[attr-defined]
     database.checkpoint.assert_called_once()
     database.check_pages.assert_called_once()
+    store_watch.free_room.require.assert_called_once_with(database, blobs, 1000)  # type: ignore[attr-defined]
 
 
 def test_trouble_is_told_until_it_is_over(database: Mock) -> None:
-    watch = StoreWatch(database, Mock())
+    watch = StoreWatch(database, Mock(), 0)
     for error in (StorageUnavailable("database: locked"), OSError("no space")):
         database.ping.side_effect = error
         watch.look()
@@ -52,7 +54,7 @@ def test_trouble_is_told_until_it_is_over(database: Mock) -> None:
 
 
 def test_what_nobody_thought_of_is_trouble_too_and_is_raised(database: Mock) -> None:
-    watch = StoreWatch(database, Mock())
+    watch = StoreWatch(database, Mock(), 0)
     database.ping.side_effect = ZeroDivisionError
     with pytest.raises(ZeroDivisionError):
         watch.look()
@@ -67,7 +69,7 @@ def test_pages_are_read_for_a_hundredth_of_the_time_and_their_damage_stands_mean
         raise DatabaseError("page 7 is damaged")
 
     database.check_pages.side_effect = read
-    watch = StoreWatch(database, Mock())
+    watch = StoreWatch(database, Mock(), 0)
     watch.look()
     assert watch.trouble == "page 7 is damaged"
     clock.now += 49.9

@@ -43,3 +43,15 @@ def test_readiness_asks_the_database_too(
         assert client.get("/readyz").status_code == httpx.codes.OK
     assert (response.status_code, response.json()["type"]) == (503, "/problems/storage-unavailable")
     assert "database" in response.json()["detail"]
+
+
+def test_a_nearly_full_disk_takes_no_upload_and_is_not_ready(
+    serving: Callable[[Settings], AbstractContextManager[httpx.Client]], tmp_path: Path
+) -> None:
+    with serving(Settings(data_folder=tmp_path, workers=0, least_free_bytes=2**50)) as client:
+        upload = client.post("/v1/grasp-logs", content=b"PK", headers={"content-type": "application/zip"})
+        answers = [client.get("/readyz"), upload]
+        assert client.get("/v1/grasp-logs").status_code == httpx.codes.OK
+    for response in answers:
+        assert (response.status_code, response.json()["type"]) == (503, "/problems/storage-unavailable")
+        assert "nearly full" in response.json()["detail"]
