@@ -43,9 +43,9 @@ def set_webhook_entry(session: Session, entry_id: int, before: int | None) -> No
     )
 
 
-def seen_clock(session: Session) -> SeenClock | None:
-    """The clock as a server last looked at it; None where none has."""
-    row = session.scalar(select(StoreRow))
+def seen_clock(session: Session, *, lock: bool = False) -> SeenClock | None:
+    """The clock as a server last looked at it; None where none has. ``lock``: others note it after this transaction."""
+    row = session.scalar(select(StoreRow).with_for_update() if lock else select(StoreRow))
     if row is None or row.clock_seen_at is None:
         return None
     return SeenClock(row.clock_seen_at, row.clock_steady_seconds or 0.0)

@@ -47,7 +47,7 @@ class SteadyClock:
         at, moment = now(), time.monotonic()
         look = Look(moment, at.timestamp() - moment)
         with self._database.write(durable=False) as session:
-            seen = stores.seen_clock(session)
+            seen = stores.seen_clock(session, lock=True)
             if seen is None:
                 seen = SeenClock(at, 0.0)
             elif (jump := self._jump(seen, look, at)) is not None:

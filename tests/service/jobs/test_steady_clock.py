@@ -1,3 +1,4 @@
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -5,7 +6,7 @@ from sqlalchemy import select, update
 
 from db.database import Database
 from db.errors import StorageUnavailable
-from db.records import NewGraspLog
+from db.records import NewGraspLog, SeenClock
 from db.repositories import grasp_logs, stores, uploads
 from db.tables import GraspLogRow
 from service.jobs import steady_clock
@@ -247,3 +248,27 @@ def test_a_command_doubts_a_clock_that_no_server_vouches_for(store: Database, cl
     assert not doubts(store)
     clocks.go(timedelta(days=200))
     assert "a server last saw 2026-11-28" in doubts(store)
+
+
+def test_a_look_overwrites_nothing_that_another_process_saw_meanwhile(
+    store: Database, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other one saw a jump, say: the time for which the clock was steady before must not come back."""
+    clock = believed(SteadyClock(store), clocks)
+
+    def note() -> None:
+        with store.write() as session:
+            stores.note_clock(session, SeenClock(clocks.wall, 0.0))
+
+    with ThreadPoolExecutor(1) as other:
+        asked: list[Future[None]] = []
+
+        def jump(*_: object) -> None:
+            asked.append(other.submit(note))
+            wait(asked, timeout=0.2)
+
+        monkeypatch.setattr(clock, "_jump", jump)
+        clock.is_believed()
+        asked[0].result(30.0)
+    with store.read() as session:
+        assert stores.seen_clock(session) == SeenClock(clocks.wall, 0.0)

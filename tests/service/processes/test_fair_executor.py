@@ -71,13 +71,18 @@ def test_another_does_not_wait_for_what_takes_long_and_its_owner_does() -> None:
 
 def test_owners_whose_work_takes_long_leave_a_thread_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fair_executor, "LONG_SECONDS", 0.0)
-    executor, may_end = FairExecutor(threads=2), Event()
+    executor, has_begun, may_end = FairExecutor(threads=2), Event(), Event()
+
+    def last() -> bool:
+        has_begun.set()
+        return may_end.wait(30.0)
+
     for owner in ("long", "as long"):
         executor.of(owner).submit(int).result(30.0)
-    begun = [executor.of(owner).submit(may_end.wait, 30.0) for owner in ("long", "as long")]
-    monkeypatch.setattr(fair_executor, "LONG_SECONDS", 1.0)
-    assert [executor.of("short").submit(int, number).result(30.0) for number in "12"] == [1, 2]
-    assert [future.running() for future in begun] == [True, False]
+    begun = [executor.of(owner).submit(last) for owner in ("long", "as long")]
+    assert has_begun.wait(30.0)
+    assert [executor.of(f"short {number}").submit(int, number).result(30.0) for number in "12"] == [1, 2]
+    assert sum(future.running() for future in begun) == 1
     may_end.set()
     assert [future.result(30.0) for future in begun] == [True, True]
 
