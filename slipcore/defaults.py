@@ -719,6 +719,15 @@ class CheckOptions(Options):
     """Elements beyond that from which they tell the sensor's zero during a grasp."""
     normal_lean: Annotated[float, Option(0.0, 1.0, "rad", "friction of 0.4 is off by 9 % then; Tac3D's 3e-5")] = 0.03
     """Largest angle by which all normals lean against the surface."""
+    lean_errors: Annotated[float, Option(0.0, 100.0, "-", "by chance in 0.3 % of frames")] = 3.0
+    """Standard errors that such a lean is more than, too."""
+    large_lean: Annotated[float, Option(0.0, 1.57, "rad", "20°; a rim on 3 × 3 elements bends the mean by 5")] = 0.35
+    """From which on the lean is that of the mean normal."""
+    least_turning: Annotated[float, Option(0.0, 1.0, "rad", "a thirtieth of the lean allowed")] = 1e-3
+    """Root mean square by which normals turn with place on a surface that is curved."""
+    flat_places: Annotated[float, Option(0.0, 1.0, "-", "the places of a dome 0.25 to 0.33")] = 0.1
+    """How far places lie off their plane, over the product of how far they and their normals spread, below which they
+    are flat under the normals of a curved surface."""
     gripper_share: Annotated[float, Option(0.0, 10.0, "-", "resultants of Tac3D part from their sum by 3 to 7 %")] = (
         0.15
     )

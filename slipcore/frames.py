@@ -19,6 +19,11 @@ BoolArray = NDArray[np.bool_]
 Frames = BoolArray | NDArray[np.int64] | slice
 
 
+def unit(vector: FloatArray) -> FloatArray:
+    """Vectors [..., k] over their lengths; 0 stays."""
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), np.finfo(float).tiny))
+
+
 class Frame(NamedTuple):
     """One tactile frame: what a detector's ``step`` takes."""
 

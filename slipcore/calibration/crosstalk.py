@@ -5,7 +5,7 @@ import numpy as np
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
 from slipcore.calibration.press import PressLog, load_terms, marker_motion
-from slipcore.frames import FloatArray
+from slipcore.frames import FloatArray, unit
 
 
 def crosstalk(press: PressLog) -> list[PressResult]:
@@ -45,8 +45,7 @@ def inward_share(press: PressLog) -> PressResult:
     force = press.split[press.pressed][:, press.footprint]
     place, normal = press.log.position[press.footprint][:, :2], np.maximum(force[..., 2:], 0.0)
     arm = (normal * place).sum(axis=1, keepdims=True) / normal.sum(axis=1, keepdims=True) - place
-    direction = arm / np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), np.finfo(float).tiny)
-    share = (force[..., :2] * direction).sum(axis=(1, 2)) / normal.sum(axis=(1, 2))
+    share = (force[..., :2] * unit(arm)).sum(axis=(1, 2)) / normal.sum(axis=(1, 2))
     error = np.hypot(error_of_mean(share - share.mean()), _zero_error(press) / normal.sum(axis=(1, 2)).mean())
     return PressEstimate(float(share.mean()), float(error))
 

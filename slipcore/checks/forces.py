@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from slipcore.checks.rest import frames_at_rest, touched_elements
 from slipcore.checks.subject import Subject
+from slipcore.defaults import CheckOptions
 from slipcore.finding import Finding
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import BoolArray, FloatArray, unit
 
 ComplexArray = NDArray[np.complex128]
-
-_LARGE_LEAN = np.radians(20.0)
-"""From which on the mean normal is compared; below, it parts from the surface's by what a coarse rim bends, too."""
 
 
 def zero_offset(seen: Subject) -> Iterator[Finding]:
@@ -111,51 +109,79 @@ def _leaves_the_lattice(seen: Subject, held: NDArray[np.intp]) -> bool:
 def leaning_normals(seen: Subject) -> Iterator[Finding]:
     """Normals that lean against the surface that the elements lie on, in all frames: friction splits forces by them."""
     log = seen.log
-    if log.normal is None or log.has_reconstructed_force or min(log.grid) < 2:
+    if log.normal is None or log.has_reconstructed_force or min(log.grid) < 3:
         return
     idle = np.flatnonzero(~seen.history.contact.any(axis=(1, 2)))
     frames = idle if len(idle) > 1 else np.arange(len(log))
     chosen = np.unique(frames[np.linspace(0, len(frames) - 1, seen.limits.stretch_frames).astype(int)])
-    lean, rest = min(_lean_of_frame(log.normal[k], log.position, log.displacement[k]) for k in chosen)
-    if lean > max(seen.limits.normal_lean, rest):
-        degrees = np.degrees(lean)
+    found = (_lean_of_frame(log.normal[k], log.position, log.displacement[k], seen.limits) for k in chosen)
+    leans = [each for each in found if each is not None]
+    if leans and all(lean > max(seen.limits.normal_lean, seen.limits.lean_errors * error) for lean, error in leans):
+        degrees = np.degrees(min(leans)[0])
         evidence = f"normals lean by {degrees:.1f}° against the surface that the elements lie on, in every frame"
         yield Finding("leaning normals", evidence, "give normals in the sensor's frame, or none")
 
 
-def _lean_of_frame(normal: FloatArray, position: FloatArray, displacement: FloatArray) -> tuple[float, float]:
-    """``_lean`` against the surface at rest, or as it is pressed: that to which the normals belong, leaving less."""
-    return min((_lean(normal, place) for place in (position, position + displacement)), key=lambda each: each[1])
+def _lean_of_frame(
+    normal: FloatArray, position: FloatArray, displacement: FloatArray, limits: CheckOptions
+) -> tuple[float, float] | None:
+    """``_lean`` against the surface at rest, or as it is pressed: that to which the normals belong, told better."""
+    found = (_lean(normal, place, limits) for place in (position, position + displacement))
+    return min((each for each in found if each is not None), key=lambda each: each[1], default=None)
 
 
-def _lean(normal: FloatArray, place: FloatArray) -> tuple[float, float]:
-    """Angle in rad by which normals [n, m, 3] lean alike against the surface through ``place`` [n, m, 3] m, and the
-    standard deviation of what is left of them; (0, 0) where the places show no surface.
+def _lean(normal: FloatArray, place: FloatArray, limits: CheckOptions) -> tuple[float, float] | None:
+    """Angle in rad by which normals [n, m, 3] lean alike against the surface through ``place`` [n, m, 3] m, and its
+    standard error; None where the places do not show the surface.
 
     The line to a neighbour is square to the mean of both normals, exactly so on a sphere, a cylinder and a plane,
-    however few elements there are. Of places that are flat under the normals of a dome much is left. Of large leans
-    the mean normal tells more, against the plane of the mean lines: a line along the lean is square to normals however
-    they are turned about it.
+    however few elements there are. Of large leans the mean normal tells more, against the plane of the mean lines: a
+    line along the lean is square to normals however they are turned about it.
     """
-    upward = _unit(normal.mean(axis=(0, 1)))
+    if _is_flat_below(normal, place, limits):
+        return None
+    upward = unit(normal.mean(axis=(0, 1)))
     turns, gaps, along = list[FloatArray](), list[FloatArray](), list[FloatArray]()
     for axis in (0, 1):
-        line = _unit(np.diff(place, axis=axis))
+        line = unit(np.diff(place, axis=axis))
         middle = 0.5 * (np.delete(normal, 0, axis) + np.delete(normal, -1, axis))
-        turns.append(np.cross(middle, line).reshape(-1, 3))
-        gaps.append(-np.vecdot(middle, line).ravel())
+        turns.append(np.moveaxis(np.cross(middle, line), axis, 0).reshape(-1, 3))
+        gaps.append(-np.moveaxis(np.vecdot(middle, line), axis, 0).ravel())
         along.append(line.mean(axis=(0, 1)))
     turn, gap = np.concatenate(turns), np.concatenate(gaps)
     across = turn - np.outer(turn @ upward, upward)  # turned about themselves normals lean nowhere
-    found = np.linalg.lstsq(across, gap, rcond=None)[0]
-    outward, left = _unit(np.cross(along[0], along[1])), float((gap - across @ found).std())
+    inverse = np.linalg.pinv(across, rcond=float(np.sqrt(np.finfo(float).eps)))
+    found = inverse @ gap
+    weight, left = unit(found) @ inverse, gap - across @ found
+    outward = unit(np.cross(along[0], along[1]))
     direct = float(np.arctan2(np.linalg.norm(np.cross(upward, outward)), abs(upward @ outward)))
-    return (direct if direct > _LARGE_LEAN else float(np.arctan(np.linalg.norm(found)))), left
+    if direct > limits.large_lean:
+        return direct, float(normal.std(axis=(0, 1)).max() / np.sqrt(normal[..., 0].size))
+    return float(np.arctan(np.linalg.norm(found))), _error_of_lean(weight, left, normal.shape[:2])
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    """Vectors [..., 3] over their lengths; 0 stays."""
-    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), np.finfo(float).tiny))
+def _error_of_lean(weight: FloatArray, left: FloatArray, grid: tuple[int, int]) -> float:
+    """Standard error of the weighted sum over the lines between neighbours, rows of axis 0 before those of axis 1.
+
+    Of what is ``left`` of each line alone, or of strips of lines that lie side by side, which a rim takes alike. Twice
+    the variance: two lines in a row share a normal.
+    """
+    n, m = grid
+    alone = float(left @ left) / (len(left) - 2) * float(weight @ weight)
+    rows, columns = np.split(weight * left, [(n - 1) * m])
+    sums = [(rows.reshape(n - 1, m).sum(axis=1), n - 1), (columns.reshape(m - 1, n).sum(axis=1), m - 1)]
+    strips = sum(float(each @ each) * count / (count - 1) for each, count in sums)
+    return float(np.sqrt(2.0 * max(alone, strips)))
+
+
+def _is_flat_below(normal: FloatArray, place: FloatArray, limits: CheckOptions) -> bool:
+    """Whether places [n, m, 3] lie in a plane while normals turn from place to place, as on a curved sensor."""
+    around, turned = ((each - each.mean(axis=(0, 1))).reshape(-1, 3) for each in (place, normal))
+    within, size, _ = np.linalg.svd(around, full_matrices=False)
+    root, spread = np.sqrt(len(turned)), float(np.linalg.norm(within[:, :2].T @ turned))
+    noise = np.sqrt(max(float((turned**2).sum()) - spread**2, 0.0))
+    turns = spread > max(noise, limits.least_turning * root)
+    return bool(turns and size[2] * root < limits.flat_places * spread * float(np.hypot(*size[:2])))
 
 
 def _alike(read: FloatArray, readings: FloatArray, may_leak: bool = False) -> float:

@@ -5,6 +5,8 @@ import pytest
 
 from slipcore import GraspLog
 from slipcore.checks import forces
+from slipcore.defaults import CheckOptions
+from slipcore.frames import unit
 from tests.slipcore.checks.by_hand import log, over_time, subject, told
 
 FRAMES = np.arange(40)
@@ -168,6 +170,65 @@ def test_normals_lean_by_more_than_a_thirtieth(axis: int, degrees: float, said: 
     assert bool(found) == bool(said)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("degrees", [30.0, 60.0, 90.0])
+def test_a_large_lean_is_told_as_an_angle(axis: int, degrees: float) -> None:
+    """By 90° axes are exchanged: lines along the lean are square to no normal then."""
+    normal = np.zeros((40, *GRID, 3))
+    normal[..., axis], normal[..., 2] = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    found = told(forces.leaning_normals(subject(held(normal=normal), CONTACT)))
+    assert found.startswith(f"normals lean by {degrees:.1f}°")
+
+
+def lean(normal: np.ndarray, place: np.ndarray) -> tuple[float, float] | None:
+    """Of one frame."""
+    return forces._lean(normal, place, CheckOptions())
+
+
+def dome(elements: int, pitch: float, aside: float, radius: float = 15e-3) -> tuple[np.ndarray, np.ndarray]:
+    """Places and normals of a piece of a sphere."""
+    line = (np.arange(elements) - (elements - 1) / 2) * pitch
+    x, y = np.meshgrid(line + aside, line)
+    place = np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=-1)
+    return place, place / radius
+
+
+@pytest.mark.parametrize("aside", [0.0, 2e-3, 4e-3])
+def test_flat_places_under_the_normals_of_a_dome_show_no_surface(aside: float) -> None:
+    place, normal = dome(5, 1e-3, aside)
+    assert lean(normal, place * np.array([1.0, 1.0, 0.0])) is None
+    found = lean(normal, place)
+    assert found is not None
+    assert found[0] < 1e-6
+
+
+def test_a_rim_between_few_elements_is_no_lean() -> None:
+    """Normals turn faster on its far side than on its near one: 2.0° on these nine."""
+    x, y = np.meshgrid(np.array([0.0, 3e-3, 6e-3]), np.array([0.0, 3e-3, 6e-3]))
+    place = np.stack([x, y, -(x**4 + y**4) * 1.25e6], axis=-1)
+    angle, error = lean(unit(np.stack([5e6 * x**3, 5e6 * y**3, np.ones_like(x)], axis=-1)), place) or (0.0, 0.0)
+    assert np.degrees(angle) == pytest.approx(2.0, abs=0.1)
+    assert 3.0 * error > angle
+
+
+def test_a_lean_of_noisy_normals_is_told_with_its_error() -> None:
+    rng = np.random.default_rng(0)
+    place = dome(8, 1e-3, 0.0)[0] * np.array([1.0, 1.0, 0.0])
+    noisy = unit(np.array([np.sin(0.15), 0.0, np.cos(0.15)]) + 0.2 * rng.standard_normal(place.shape))
+    found = lean(noisy, place)
+    assert found is not None
+    assert found[0] == pytest.approx(0.15, abs=0.06)
+    assert 3.0 * found[1] < found[0]  # though one line's normals scatter by as much
+
+
+def test_of_fewer_than_three_rows_no_lean_is_told() -> None:
+    normal = np.zeros((40, 2, 8, 3))
+    normal[..., 0], normal[..., 2] = np.sin(0.1), np.cos(0.1)
+    still = np.zeros((40, 2, 8, 3))
+    few = subject(log(still, still, frames=40, grid=(2, 8), normal=normal), np.zeros((40, 2, 8), bool))
+    assert not any(forces.leaning_normals(few))
+
+
 def test_normals_that_lean_in_some_frames_only_are_left_alone() -> None:
     normal = np.zeros((40, *GRID, 3))
     normal[..., 2] = 1.0
@@ -212,7 +273,7 @@ def test_exchanged_axes_go_with_the_markers_as_in_a_mirror() -> None:
 
 
 def test_a_direction_is_a_vector_over_its_length_and_nothing_stays_nothing() -> None:
-    found = forces._unit(np.array([[0.3, 0.0, 0.4], [0.0, 0.0, 0.0]]))
+    found = unit(np.array([[0.3, 0.0, 0.4], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(found, [[0.6, 0.0, 0.8], [0.0, 0.0, 0.0]], rtol=1e-15)
 
 
