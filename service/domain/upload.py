@@ -114,6 +114,7 @@ async def received(
     _check_type(request.content_type)
     encoding = check_encoding(request.content_encoding)
     in_thread = partial(context.threads.run, request.principal.share)
+    await in_thread(context.require_room)
     material_id = await in_thread(_check, context, request)
     with ExitStack() as spools:
         body = spools.enter_context(context.blobs.spool())
@@ -313,7 +314,6 @@ def _material(session: Session, settings: Settings, received: ReceivedLog) -> in
 
 def _check(context: Context, request: UploadRequest) -> int | None:
     """What can be checked before the bytes are there; returns the material's key, None where there is none yet."""
-    context.require_room()
     if request.detector not in METHOD_NAMES:
         raise InvalidValue("detector", request.detector, ", ".join(METHOD_NAMES))
     if request.sensor is not None:

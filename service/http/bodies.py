@@ -75,11 +75,12 @@ def _check_encoding(body: bytes) -> None:
 
     The parser of short bodies takes UTF-16 and UTF-32 as well, that of long ones does not.
     """
-    if body.startswith(codecs.BOM_UTF8) or b"\0" in body or not _is_utf_8(body):
+    if body.startswith(codecs.BOM_UTF8) or b"\0" in body or not is_utf_8(body):
         raise json.JSONDecodeError("another encoding than UTF-8 without a byte order mark", "", 0)
 
 
-def _is_utf_8(body: bytes) -> bool:
+def is_utf_8(body: bytes) -> bool:
+    """Whether bytes are text."""
     try:
         body.decode()
     except UnicodeDecodeError:

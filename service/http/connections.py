@@ -256,10 +256,10 @@ class BoundedConnection(asyncio.Protocol):
             self._close_one(self._of_largest_address())
 
     def _of_largest_address(self) -> list[Any]:
-        """Of the addresses that have an idle connection, the connections of the one that has most."""
+        """Of the addresses that have a connection which makes room, the connections of the one that has most."""
         addresses = Counter(map(_address, self.connections))
-        idle = {_address(each) for each in self.connections if each is not self and _is_idle(each)}
-        largest = max(idle, key=addresses.__getitem__, default=None)
+        unneeded = {_address(each) for each in self.connections if each is not self and _is_unneeded(each)}
+        largest = max(unneeded, key=addresses.__getitem__, default=None)
         return [each for each in self.connections if _address(each) == largest]
 
     def _close_one(self, held: list[Any]) -> bool:

@@ -1,12 +1,15 @@
 """The server's WebSocket connections, whose refusals are answers as any others."""
 
+import asyncio
 from time import perf_counter
 from typing import Any, cast
 
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
 from service.http import turns
+from service.http.bodies import is_utf_8
 from service.http.joined_writes import JoinedWrites
 
 MOST_UNSENT_BYTES = 2**20
@@ -22,10 +25,24 @@ PARSED_BYTES = 1024
 class WebSocketConnection(WebSocketsSansIOProtocol):
     """Takes a refusal for the end of the handshake: by itself the server logs it as an error of the application.
 
-    Who pings without reading is let go, and so is who sends a message in pieces without end.
+    So it does with the server's own end, and with text that is no UTF-8. Who pings without reading is let go, and so is
+    who sends a message in pieces without end.
     """
 
     _held = b""
+
+    async def run_asgi(self) -> None:
+        """Serve the connection; that the server ends before it is over is no fault of anybody."""
+        served = self.app
+
+        async def ended_with_the_server(*given: Any) -> None:
+            try:
+                await served(*given)
+            except asyncio.CancelledError:
+                raise ClientDisconnected from None
+
+        self.app = ended_with_the_server
+        await super().run_asgi()
 
     def data_received(self, data: bytes) -> None:
         """Take what has come, a piece after the other while the application has nothing to read."""
@@ -87,10 +104,21 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         if self.transport.get_write_buffer_size() > MOST_UNSENT_BYTES:
             self.transport.abort()
 
+    def send_receive_event_to_app(self) -> None:
+        """Hand a message on, unless it is text that is none (RFC 6455, 8.1)."""
+        if self.curr_msg_data_type == "text" and not is_utf_8(b"".join(self.frames)):
+            self.frames = []
+            self._fail(CloseCode.INVALID_DATA, "text that is no UTF-8")
+        else:
+            super().send_receive_event_to_app()
+
     def handle_cont(self, event: Frame) -> None:
         """Take another piece of a message."""
         if len(self.frames) < MOST_FRAGMENTS:
             super().handle_cont(event)
         else:
-            self.conn.fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MOST_FRAGMENTS} fragments")
-            self.handle_parser_exception()
+            self._fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MOST_FRAGMENTS} fragments")
+
+    def _fail(self, code: CloseCode, reason: str) -> None:
+        self.conn.fail(code, reason)
+        self.handle_parser_exception()

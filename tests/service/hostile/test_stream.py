@@ -5,7 +5,7 @@ import json
 import threading
 import tracemalloc
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import AsyncExitStack, nullcontext, suppress
+from contextlib import AbstractContextManager, AsyncExitStack, ExitStack, nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from sqlalchemy import event
 from starlette.websockets import WebSocketDisconnect
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from db.database import Database
 from db.records import NewModel
@@ -33,6 +35,7 @@ from slipcore.errors import InvalidInput
 
 SIDE = 4
 POSITION = np.stack(np.meshgrid(1e-3 * np.arange(SIDE), 1e-3 * np.arange(SIDE), [0.0]), axis=-1).reshape(-1, 3)
+MASK = bytes(4)
 ZERO = np.zeros((SIDE * SIDE, 3))
 
 
@@ -454,3 +457,63 @@ def test_a_stream_that_is_refused_is_no_error_of_the_service(
     assert (answer.status_code, answer.headers["content-type"]) == (401, "application/problem+json")
     client.get("/healthz").raise_for_status()  # by then all is logged
     assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def faults_in(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """What the log has a traceback of."""
+    return [record.getMessage() for record in caplog.records if record.exc_info is not None]
+
+
+def connected(client: httpx.Client) -> Any:
+    return connect(str(client.base_url.copy_with(scheme="ws", path="/v1/stream")), open_timeout=10.0)
+
+
+@pytest.mark.parametrize(
+    "pieces", [(b"\x81\x82" + MASK + b"\xff\xfe",), (b"\x01\x81" + MASK + b"\xc3", b"\x80\x80" + MASK)]
+)
+def test_text_that_is_none_ends_its_connection_and_is_no_error_of_the_service(
+    client: httpx.Client, caplog: pytest.LogCaptureFixture, pieces: tuple[bytes, ...]
+) -> None:
+    with connected(client) as stream:
+        for piece in pieces:
+            stream.socket.sendall(piece)
+        with pytest.raises(ConnectionClosed):
+            stream.recv(timeout=10.0)
+    assert (stream.close_code, stream.close_reason) == (1007, "text that is no UTF-8")
+    client.get("/healthz").raise_for_status()
+    assert faults_in(caplog) == []
+
+
+def test_characters_may_be_in_two_pieces(client: httpx.Client) -> None:
+    """A frame is text only with those that it goes on in."""
+    with connected(client) as stream:
+        for piece in (b"\x01\x81" + MASK + b"\xc3", b"\x80\x81" + MASK + b"\xa4"):
+            stream.socket.sendall(piece)
+        with pytest.raises(ConnectionClosed):
+            stream.recv(timeout=10.0)
+    assert stream.close_code == errors.NOT_UNDERSTOOD
+
+
+def test_streams_that_the_server_s_end_cuts_off_are_no_error_of_it(
+    serving: Callable[[Settings], AbstractContextManager[httpx.Client]],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One whose detector has not started by then."""
+    begun = threading.Event()
+
+    async def never(*_: Any) -> None:
+        begun.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(Streams, "open", never)
+    with ExitStack() as running:
+        client = running.enter_context(serving(Settings(data_folder=tmp_path, workers=0, shutdown_seconds=0.0)))
+        with connected(client) as stream:
+            stream.send(json.dumps({"type": "open", "position": [0.0] * 3, "grid": [1, 1], "element_area": 1e-6}))
+            assert begun.wait(10.0)
+            running.close()
+            with pytest.raises(ConnectionClosed):
+                stream.recv(timeout=10.0)
+    assert faults_in(caplog) == []

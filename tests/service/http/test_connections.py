@@ -12,6 +12,7 @@ from contextlib import suppress
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 import uvicorn
@@ -257,6 +258,35 @@ def test_whose_answers_are_not_read_makes_room_for_the_next(connect: Connect, en
     assert rest(another).endswith(b"hello")
     received = len(rest(unread[0]))
     assert received < len(LARGE)
+
+
+@pytest.mark.parametrize("end", [b"Connection: close\r\n", b""], ids=["closing", "idle"])
+def test_whose_answers_are_not_read_makes_room_for_other_addresses(connect: Connect, end: bytes) -> None:
+    for _ in range(MOST):
+        unread = connect()
+        unread.sendall(b"GET /large HTTP/1.1\r\nHost: a\r\n" + end + b"\r\n")
+        assert unread.recv(8).startswith(b"HTTP/1.1")
+    for _ in range(2):
+        another = connect("127.0.0.2")
+        another.sendall(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
+        assert another.recv(4096).endswith(b"hello")
+
+
+def test_a_websocket_that_closes_and_is_not_read_makes_room_for_other_addresses(
+    protocol: type[BoundedConnection],
+) -> None:
+    """It is no connection of this kind, and asks nothing either."""
+    config, state = uvicorn.Config(hello, lifespan="off", ws="none", limit_concurrency=1), uvicorn.server.ServerState()
+    config.load()
+    told = {"is_closing.return_value": True, "get_write_buffer_size.return_value": 10}
+    unread, transport = Mock(client=("10.0.0.1", 1), transport=Mock(**told), is_let_go=False), Mock()
+    state.connections.add(unread)
+
+    async def connect_another() -> None:
+        protocol(config, state, {}, per_address=10).connection_made(transport)  # type: ignore[arg-type]
+
+    asyncio.run(connect_another())
+    unread.transport.abort.assert_called_once()
 
 
 def test_whose_answer_under_way_is_not_read_is_let_go(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
