@@ -64,43 +64,43 @@ def noise_of_sums(
     noisy as they are.
 
     Of F_x, F_y, M and F_n of ``resultants`` each value is compared with the line through those before and after it, at
-    ``time`` [t] s; medians are taken over a patch's frames (those that did not change left out), of the first three the
-    noisiest counts. Noise that elements share or smooth adds up in sums to more than their own shows; that of a patch
-    of few elements shows here alone. 0 where fewer than three frames show it.
+    ``time`` [t] s, over the noise that 1 N on each of their elements would give that: elements come and go. Medians are
+    taken over a patch's frames (those that did not change left out), of the first three the noisiest counts. Noise that
+    elements share or smooth adds up in sums to more than their own shows; that of a patch of few elements shows here
+    alone. 0 where fewer than three frames show it.
     """
-    loads = np.empty((len(spans.frame), 4))
-    _fill_loads(for_kernels(force), for_kernels(normal), for_kernels(place), spans, loads)
+    loads, squares = np.empty((len(spans.frame), 4)), np.empty((len(spans.frame), 4))
+    _fill_loads(for_kernels(force), for_kernels(normal), for_kernels(place), spans, loads, squares)
     noise = np.zeros(loads.shape)
-    _fill_noise(time[spans.frame], spans.bounds, loads, noise)
+    _fill_noise(time[spans.frame], spans.bounds, loads, squares, noise)
     return np.stack([noise[:, :3].max(axis=1), noise[:, 3]], axis=-1)
 
 
 @compiled
-def _fill_loads(force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, loads: FloatArray) -> None:
-    """F_x, F_y, M and F_n [k, 4] of all frames of the patches, each in units of what noise of 1 N would make of it."""
+def _fill_loads(
+    force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, loads: FloatArray, squares: FloatArray
+) -> None:
+    """F_x, F_y, M and F_n [k, 4] of all frames of the patches, and the variance that noise of 1 N gives each."""
     for e, k in enumerate(spans.frame):
         patch = elements_at(spans, e)
         pressing, arm, load = _felt(force[k], normal[k], place[k], patch)
-        unit, turning = math.sqrt(len(patch)), math.sqrt((arm * arm).sum())
-        loads[e] = math.nan
-        if len(patch) > 0:
-            loads[e, 0], loads[e, 1], loads[e, 3] = load[0] / unit, load[1] / unit, pressing.sum() / unit
-        if turning > 0.0:
-            loads[e, 2] = load[2] / turning
+        loads[e, :3], loads[e, 3] = load, pressing.sum()
+        squares[e], squares[e, 2] = len(patch), (arm * arm).sum()
 
 
 @compiled
-def _fill_noise(time: FloatArray, bounds: IntArray, loads: FloatArray, noise: FloatArray) -> None:
+def _fill_noise(time: FloatArray, bounds: IntArray, loads: FloatArray, squares: FloatArray, noise: FloatArray) -> None:
     """Of each of the sums [k, 4], the same for all frames of a patch."""
     for p in range(len(bounds) - 1):
         begin, end = bounds[p], bounds[p + 1]
         for axis in range(loads.shape[1]):
-            residual, count = np.empty(end - begin), 0
+            residual, count, load, square = np.empty(end - begin), 0, loads[:, axis], squares[:, axis]
             for e in range(begin + 1, end - 1):
-                share = (time[e] - time[e - 1]) / (time[e + 1] - time[e - 1])
-                off = loads[e, axis] - (1.0 - share) * loads[e - 1, axis] - share * loads[e + 1, axis]
-                if off != 0.0 and math.isfinite(off):
-                    residual[count] = abs(off) / math.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
+                late = (time[e] - time[e - 1]) / (time[e + 1] - time[e - 1])
+                off = load[e] - (1.0 - late) * load[e - 1] - late * load[e + 1]
+                variance = square[e] + (1.0 - late) ** 2 * square[e - 1] + late**2 * square[e + 1]
+                if off != 0.0 and math.isfinite(off) and variance > 0.0:
+                    residual[count] = abs(off) / math.sqrt(variance)
                     count += 1
             if count > 0:
                 noise[begin:end, axis] = DEVIATION_TO_SIGMA * median(residual[:count])
