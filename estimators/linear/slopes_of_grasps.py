@@ -28,10 +28,10 @@ def with_slopes_that_differ(grasps: Sequence[GraspStatistics], law: FloatArray) 
     """The same grasps, whose samples within places say so many times less of slopes as grasps differ more in them.
 
     Errors that go together for as long as a grasp lasts make a slope in it, which no grasp by itself separates from the
-    law's. Were all slopes alike, but for the factor by which the level of their grasp is off the ``law`` [3] of
-    (1, v, f_n), the mean square of what they differ by would be that of the samples (analysis of covariance). The
-    ratio of the two, where it is above 1, divides what the samples say (overdispersion; McCullagh & Nelder, 1989,
-    §4.5).
+    law's. Were all slopes alike, or alike but for the factor by which the level of their grasp is off the ``law`` [3]
+    of (1, v, f_n), the mean square of what they differ by would be that of the samples (analysis of covariance). The
+    ratio of the two, of what is nearer, divides what the samples say where it is above 1 (overdispersion; McCullagh &
+    Nelder, 1989, §4.5): a level may be off by its few places, with which slopes do not go.
     """
     within = np.stack([grasp.within for grasp in grasps])
     found = _slopes(within)
@@ -54,23 +54,30 @@ def _slopes(within: FloatArray) -> Slopes:
 
 def _times(grasps: Sequence[GraspStatistics], within: FloatArray, found: Slopes, law: FloatArray) -> float:
     """Mean square of what slopes differ by, over that of the samples; 1 where the grasps don't tell."""
-    factor = _factors(grasps, law)
+    places = sum(float(grasp.count.sum()) for grasp in grasps)
+    samples = sum(grasp.total_weight for grasp in grasps) ** 2 / sum(grasp.weight_square for grasp in grasps)
+    slopes = int(np.count_nonzero(found.regressors.any(axis=2)))
+    left = float(np.square(within[..., 2] - np.einsum("gij,gj->gi", found.axes, found.response)).sum())
+    if samples <= places + slopes or left <= (ROUNDING * found.size[2]) ** 2:
+        return 1.0
+    differ = min(_mean_square(found, factor) for factor in (np.ones(len(grasps)), _factors(grasps, law)))
+    return differ / (left / (samples - places - slopes))
+
+
+def _mean_square(found: Slopes, factor: FloatArray) -> float:
+    """Of what the slopes of grasps differ by, were they ``factor`` [g] times those of the law; 0 where none is left."""
     rows, response = (factor[:, None, None] * found.regressors).reshape(-1, 2), found.response.ravel()
     alike, _, rank, _ = np.linalg.lstsq(rows, response, rcond=CLUSTERS.alone)
-    slopes, places = int(np.count_nonzero(rows.any(axis=1))), sum(float(grasp.count.sum()) for grasp in grasps)
-    samples = sum(grasp.total_weight for grasp in grasps) ** 2 / sum(grasp.weight_square for grasp in grasps)
-    left = float(np.square(within[..., 2]).sum() - response @ response)  # rounded as squares of this size are
-    if slopes <= rank or samples <= places + slopes or left <= ROUNDING * found.size[2] ** 2:
-        return 1.0
-    misfit = float(np.square(response - rows @ alike).sum())
-    return misfit / (slopes - rank) / (left / (samples - places - slopes))
+    degrees = np.count_nonzero(rows.any(axis=1)) - rank
+    return float(np.square(response - rows @ alike).sum()) / degrees if degrees > 0 else 0.0
 
 
 def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> FloatArray:
     """By which the level of each grasp is off the law; 1 where the law is hardly more than what grasps scatter by.
 
     A quotient there tells of scatter, not of a factor, and has any size and sign. Where the law is above twice the
-    scatter, levels off by two of its deviations have factors from 0 to 2.
+    scatter, levels off by two of its deviations have factors from 0 to 2. Grasps that differ by factors have the law
+    above twice their scatter up to a τ of 0.5.
     """
     means = np.stack([np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count) for grasp in grasps])
     expected, friction = law[0] + means[:, :2] @ law[1:], means[:, 2]

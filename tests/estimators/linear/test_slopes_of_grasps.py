@@ -69,6 +69,17 @@ def test_slopes_that_go_with_the_level_of_their_grasp_do_not_differ() -> None:
     assert divided_by([replace(each, mean=each.mean * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.48]) for each in grasps]) > 10.0
 
 
+def test_slopes_that_are_alike_whatever_the_level_of_their_grasp_do_not_differ() -> None:
+    """As where the few places of each grasp differ; by their levels slopes seemed to differ, and counted for less."""
+    rng = np.random.default_rng(0)
+    grasps = statistics([grasp(rng, 3, 0.0, 0.0, error=1e-3) for _ in range(12)])
+    off = np.resize([-0.05, 0.05], 12)
+    apart = [
+        replace(each, mean=each.mean + np.array([0.0, 0.0, level])) for each, level in zip(grasps, off, strict=True)
+    ]
+    assert divided_by(apart) == pytest.approx(divided_by(grasps), rel=0.01)
+
+
 def test_one_grasp_and_grasps_without_error_are_left_as_they_are() -> None:
     rng = np.random.default_rng(0)
     for grasps in ([grasp(rng, 3)], [grasp(rng, 3, scatter=0.0, error=0.0) for _ in range(3)]):
