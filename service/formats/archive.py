@@ -22,6 +22,8 @@ MAX_DIRECTORY_BYTES = 64 * 1024
 _DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
 _MEMBER = b"PK\x03\x04"
 _END_OF_DIRECTORY, _ZIP64_LOCATOR, _END_BYTES, _LOCATOR_BYTES = b"PK\x05\x06", b"PK\x06\x07", 22, 20
+_ELSEWHERE = 2**32 - 1
+"""In place of a number that zip64 has; zip -fz writes it into a pipe, and no zip64 that has it."""
 _ENCRYPTED = 0x1
 _LOCAL_BYTES, _LOCAL_LENGTHS = 30, 26
 """Bytes of the header before a member, and where in it the lengths of its name and extra field are."""
@@ -138,10 +140,11 @@ def _check_directory(path: Path) -> None:
     if start not in {_MEMBER, _END_OF_DIRECTORY}:
         raise InvalidInput("file", f"a zip behind other bytes (it starts with {start!r})", "nothing before a zip")
     size, offset, comment = struct.unpack_from("<IIH", tail, end + 12)
-    zip64 = tail[max(0, end - _LOCATOR_BYTES) : end].startswith(_ZIP64_LOCATOR)
+    zip64 = tail[max(0, end - _LOCATOR_BYTES) : end].startswith(_ZIP64_LOCATOR) or _ELSEWHERE in (size, offset)
     if zip64 or size > MAX_DIRECTORY_BYTES:
         value = "in the zip64 layout" if zip64 else f"{size} bytes"
-        raise InvalidInput("table of contents", value, f"at most {MAX_DIRECTORY_BYTES} bytes, no zip64")
+        allowed = f"at most {MAX_DIRECTORY_BYTES} bytes, no zip64 (zip without -fz)"
+        raise InvalidInput("table of contents", value, allowed)
     behind, before = len(tail[end + _END_BYTES + comment :].rstrip(b"\0")), length - len(tail) + end - (offset + size)
     if behind > 0:
         raise InvalidInput("file", f"a zip with {behind} other bytes behind it", "nothing behind a zip")

@@ -77,6 +77,10 @@ def _log(
     for name in (*VECTORS, *MASKS):
         if name in members:
             members[name] = _on_grid(name, members[name], grid)
+    if mapping.rest == rest.ALL_FRAMES and members.get("time", np.empty(0)).shape == (1,):
+        members |= _held(members)
+    if "displacement" in members and "observed" in members:
+        members["displacement"] = _with_placeholders(members["displacement"], members["observed"])
     has_height = "height" in members
     if has_height:
         _from_heights(members, mapping, grid, metadata)
@@ -103,6 +107,18 @@ def _log(
     from slipcore.markers import contact_by_motion  # loads scipy.spatial, which few files need
 
     return replace(log, contact=contact_by_motion(log.time, log.displacement))
+
+
+def _held(members: Members) -> dict[str, NDArray[Any]]:
+    """What one frame tells, for two, which a log has at least: of the sensor alone one is enough."""
+    of_frames = {name: each for name, each in members.items() if name not in ONCE and each.shape[:1] == (1,)}
+    return {name: np.repeat(each, 2, axis=0) for name, each in of_frames.items()} | {"time": np.array([0.0, 1.0])}
+
+
+def _with_placeholders(moved: NDArray[Any], observed: NDArray[Any]) -> NDArray[Any]:
+    """Displacement or place [t, n, m, c], 0 in place of NaN where no marker is ``observed`` [t, n, m]."""
+    unknown = np.isnan(moved) & ~check_mask("observed", observed, moved.shape[:-1])[..., None]
+    return np.where(unknown, 0.0, moved) if unknown.any() else moved
 
 
 def _from_heights(

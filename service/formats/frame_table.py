@@ -158,8 +158,8 @@ class _Table:
             table = order.reshape(frames, elements)
             if (time[table] == time[table[:, :1]]).all() and (column[table] == column[table[0]]).all():
                 return table
-        counts = f"{len(order)} rows of {frames} times and {elements} elements"
-        raise InvalidInput("element", counts, "a row for each element at each time, once")
+        counts = f"{len(order)} rows of {frames} times and {elements} elements, {_odd_one(time, column)}"
+        raise InvalidInput("element", counts, "a row for each once; a marker that is lost with `observed` 0")
 
     def _check_same_elements(self, name: str, fields: Sequence[str]) -> None:
         """Components side by side must be of the same elements, each there once."""
@@ -191,6 +191,17 @@ class _Table:
             allowed = "rows, and a mapping that names columns"
             raise InvalidInput("file", f"without rows of what is looked for; it has {self.contents()}", allowed)
         return np.frombuffer(values).reshape(-1, len(chosen))
+
+
+def _odd_one(time: FloatArray, element: FloatArray) -> str:
+    """The first time at which an element, of those of a table's rows, has no row or several."""
+    if not (np.isfinite(time).all() and np.isfinite(element).all()):
+        return "one without a number"
+    (times, frame), (elements, column) = (np.unique(each, return_inverse=True) for each in (time, element))
+    there = np.sort(frame * len(elements) + column)
+    odd = np.append(there != np.arange(len(there)), True).argmax()
+    place, count = (odd, "none") if odd == len(there) or there[odd] > odd else (there[odd], "several")
+    return f"{count} of element {elements[place % len(elements)]:g} at {times[place // len(elements)]:g}"
 
 
 def _header(lines: Iterator[str]) -> tuple[list[str], str, int]:

@@ -262,10 +262,44 @@ def test_markers_seen_from_above_without_forces_touch_where_they_move(tmp_path: 
 
 def test_a_missing_row_or_column_of_a_long_table_is_refused_by_name(tmp_path: Path) -> None:
     path, _ = long_table(tmp_path / "log.csv", leave_out=1)
-    with pytest.raises(InvalidInput, match="element is 23 rows of 4 times and 6 elements; allowed: a row for each"):
+    row = "element is 23 rows of 4 times and 6 elements, none of element 10 at 0; allowed: a row for each"
+    with pytest.raises(InvalidInput, match=row):
         formats.read(path, mapping=json.dumps(LONG))
     with pytest.raises(InvalidInput, match=r"element is without id; allowed: the columns marker, fz, "):
         formats.read(path, mapping=json.dumps(LONG | {"element": "id"}))
+
+
+@pytest.mark.parametrize(
+    ("told", "odd"),
+    [
+        ("0,0 0,1 1,0 1,1 0,1", "5 rows of 2 times and 2 elements, several of element 1 at 0;"),
+        ("0,0 0,1 1,0 1,0", "4 rows of 2 times and 2 elements, several of element 0 at 1;"),
+        ("0,0 0,1 1,1", "3 rows of 2 times and 2 elements, none of element 0 at 1;"),
+        ("1,1 0,0 0,1", "3 rows of 2 times and 2 elements, none of element 0 at 1;"),
+        ("0,0 0,1 1,0", "3 rows of 2 times and 2 elements, none of element 1 at 1;"),
+        ("0,0 0,1 1,0 1,nan", "4 rows of 2 times and 3 elements, one without a number;"),
+    ],
+)
+def test_a_row_too_many_or_too_few_is_named(tmp_path: Path, told: str, odd: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,e,x,y\n" + "".join(f"{row},0,0\n" for row in told.split()), encoding="utf-8")
+    mapping = {"time": "t", "element": "e", "displacement": ["x", "y"], "grid": [1, 2], "pitch": 1e-3}
+    with pytest.raises(InvalidInput, match=odd):
+        formats.read(path, mapping=json.dumps(mapping))
+
+
+def test_a_marker_that_is_said_to_be_lost_needs_no_displacement(tmp_path: Path) -> None:
+    rows = [f"{frame},{marker},1e-5,{marker}e-6,1" for frame in range(3) for marker in range(4)]
+    rows[5] = "1,1,,,0"
+    path = tmp_path / "log.csv"
+    path.write_text("t,e,x,y,seen\n" + "\n".join(rows), encoding="utf-8")
+    mapping = {"time": "t", "element": "e", "displacement": ["x", "y"], "grid": [2, 2], "pitch": 1e-3}
+    with pytest.raises(InvalidInput, match=r"displacement is nan at index \[1, 0, 1, 0\]"):
+        formats.read(path, mapping=json.dumps(mapping))
+    log = formats.read(path, mapping=json.dumps(mapping | {"observed": "seen"}))
+    assert log.observed is not None
+    assert np.argwhere(~log.observed).tolist() == [[1, 0, 1]]
+    assert log.displacement[1, 0, 1].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_rows_of_a_frame_state_its_gripper_force_alike(tmp_path: Path) -> None:

@@ -196,6 +196,16 @@ def test_a_huge_table_of_contents_is_refused_before_it_is_read(tmp_path: Path) -
         npz.read(path)
 
 
+def test_zip64_of_a_pipe_is_refused_as_such(log: GraspLog, tmp_path: Path) -> None:
+    """`zip -fz - *.npy | cat` points to a zip64 table of contents, and writes none: unzip refuses it as well."""
+    path = tmp_path / "log.npz"
+    content = bytearray(container.encode(log))
+    content[-6:-2] = b"\xff" * 4
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=r"in the zip64 layout; allowed: .*no zip64 \(zip without -fz\)"):
+        npz.read(path)
+
+
 def test_zip64_is_refused(log: GraspLog, tmp_path: Path) -> None:
     content = container.encode(log)
     end = content.rfind(b"PK\x05\x06")

@@ -109,6 +109,32 @@ def test_lost_frames_of_the_sensor_alone_do_not_shift_its_rest(tmp_path: Path) -
     assert rested.observed is None
 
 
+@pytest.mark.parametrize("with_force", [False, True])
+def test_one_frame_of_the_sensor_alone_is_its_rest(tmp_path: Path, with_force: bool) -> None:
+    """It had been refused: a log has two at least."""
+    (tmp_path / "alone").mkdir()
+    told = {"displacement": np.full((1, 2, 2, 3), 2e-4).tolist(), "time": [0.0]}
+    forces = {"force": np.zeros((1, 2, 2, 3)).tolist(), "gripper_force": [0.1]} if with_force else {}
+    rested = formats.read(log_of(tmp_path), rest=log_of(tmp_path / "alone", **told, **forces))
+    np.testing.assert_allclose(rested.displacement, MOVED - 2e-4, rtol=0, atol=1e-18)
+    with pytest.raises(InvalidInput, match=r"time is 1 frame\(s\); allowed: at least 2 frames"):
+        formats.read(log_of(tmp_path, **told))
+
+
+@pytest.mark.parametrize("mapped", [False, True], ids=["tracked", "mapped"])
+def test_one_frame_of_the_markers_alone_is_their_rest(tmp_path: Path, mapped: bool) -> None:
+    """In every format alike."""
+    log, alone = tmp_path / "log.csv", tmp_path / "alone.csv"
+    place = [(1e-3 * (k % 4), 1e-3 * (k // 4)) for k in range(16)]
+    for path, frames, moved in ((log, 3, 1e-4), (alone, 1, 0.0)):
+        rows = [f"{t},{k},{x + moved},{y}\n" for t in range(frames) for k, (x, y) in enumerate(place)]
+        path.write_text("time,marker,x,y\n" + "".join(rows), encoding="utf-8")
+    places = {"time": "time", "element": "marker", "grid": [4, 4], "position": ["x", "y"], "displacement": ["x", "y"]}
+    settings = {"mapping": json.dumps(places)} if mapped else {"scale": 1.0}
+    found = formats.read(log, rest=alone, **settings)
+    np.testing.assert_allclose(found.displacement, np.full((3, 4, 4, 3), [1e-4, 0.0, 0.0]), rtol=0, atol=1e-12)
+
+
 def test_places_of_what_is_not_observed_at_rest_are_its_usual_ones(tmp_path: Path) -> None:
     places = np.where(OBSERVED[..., None], PLACES + MOVED, 0.0)
     mapping = json.dumps({"position": "displacement", "displacement": "displacement", "rest": "first"})
