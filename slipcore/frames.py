@@ -82,6 +82,9 @@ ALONG_NORMAL = "along the normal"
 RECONSTRUCTED = "reconstructed"
 """There, for forces that follow from displacement."""
 
+BY_MOTION, BY_FORCES = "estimated from motion", "by reconstructed forces"
+"""There, for where the contact is from."""
+
 UNNAMED = "unknown"
 """The sensor of logs that name none."""
 
@@ -181,6 +184,15 @@ class GraspLog:
     def has_reconstructed_force(self) -> bool:
         """Whether the metadata say that forces follow from displacement, as those of ``Reconstruction.apply`` do."""
         return self.force is not None and self.metadata.get("force") == RECONSTRUCTED
+
+    @property
+    def force_deviation(self) -> float:
+        """Typical standard deviation (N) of reconstructed element forces, by the metadata; 0 where they tell none."""
+        try:
+            told = float(self.metadata.get("force_deviation", "0")) if self.has_reconstructed_force else 0.0
+        except ValueError:  # a file's own words
+            return 0.0
+        return told if 0.0 <= told <= LIMITS.force else 0.0
 
     def __len__(self) -> int:
         return len(self.time)

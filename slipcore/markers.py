@@ -122,10 +122,15 @@ def contact_by_motion(time: FloatArray, displacement: FloatArray) -> BoolArray:
 
     plane = displacement[..., :2]
     noise = float(np.nan_to_num(estimate_noise(time, plane.reshape(len(time), -1, 2).swapaxes(1, 2))))
-    moved = np.hypot(plane[..., 0], plane[..., 1])
-    largest = np.quantile(moved.reshape(len(time), -1), MARKERS.touching_quantile, axis=1)[:, None, None]
+    return np.stack([taken_along(frame, noise) for frame in displacement])
+
+
+def taken_along(displacement: FloatArray, noise: float) -> BoolArray:
+    """The same of one frame's displacements [n, m, 3] m, of this ``noise`` m: [n, m]."""
+    moved = np.hypot(displacement[..., 0], displacement[..., 1])
+    largest = np.quantile(moved, MARKERS.touching_quantile)
     touching = (moved > MARKERS.touching_share * largest) & (largest > MARKERS.touching_noise * noise)
-    return np.stack([binary_fill_holes(frame) for frame in touching])
+    return np.asarray(binary_fill_holes(touching))
 
 
 def mean_spacing(markers: FloatArray) -> float:

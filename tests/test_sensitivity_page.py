@@ -28,9 +28,13 @@ WHOLE_TABLES = {
 """Tables of which no entry is on the page. What is measured leaves this list, and that below."""
 
 ENTRIES = {
-    "slipcore.forces.RECONSTRUCTION": ("force_to_noise", "of friction samples, which presses do not give"),
+    "slipcore.forces.RECONSTRUCTION": (
+        "force_to_noise least_coupling",
+        "of friction and slip, which no press gives",
+    ),
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
+    "filter": ("force_floor", "0 but of reconstructed forces, whose deviation it is"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),
 }

@@ -6,10 +6,11 @@ alone, in several draws of noise. Each factor is varied against one case (20 × 
 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's description,
 which is then wrong. It is also learnt from presses (benchmarks/forces/presses.py), frames are followed as they come
 (benchmarks/forces/stream.py), displacement is cut at the end of a range (benchmarks/forces/saturation.py), an
-independent solver's scenes are read (benchmarks/forces/references.py), and grasps are taken to friction and slip with
-the gripper's force alone (benchmarks/forces/friction.py). In the plane the normal force on a half-space is given. Peers
-are given the same displacements. Errors are those of resultants, of the field of forces on elements, and their growth
-with noise; how often stated intervals of 95 % hold the truth is reported for each group.
+independent solver's scenes are read (benchmarks/forces/references.py), grasps are taken to friction and slip with
+the gripper's force alone (benchmarks/forces/friction.py), and slip is found on other sensors
+(benchmarks/forces/slip.py). In the plane the normal force on a half-space is given. Peers are given the same
+displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
+often stated intervals of 95 % hold the truth is reported for each group.
 
 `--export FOLDER` writes the cases on which peers are tried as `.npz`; `--external NAME=FOLDER` scores what another
 method made of them: files of the same names, with `force` [t, n, m, 3] N. Writes forces-GROUP.json, prints a
@@ -36,6 +37,7 @@ from benchmarks.forces import friction as gel_friction
 from benchmarks.forces import presses as gel_presses
 from benchmarks.forces import references as gel_references
 from benchmarks.forces import saturation as gel_saturation
+from benchmarks.forces import slip as gel_slip
 from benchmarks.forces import stream as gel_stream
 from benchmarks.forces.peers import PEERS, export, imported, made
 from benchmarks.forces.presses import calibrated, calibration_table
@@ -63,6 +65,7 @@ STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
+SLIP_GROUP = "slip by sensor"
 COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
@@ -385,6 +388,15 @@ def grip(arguments: argparse.Namespace) -> None:
     write([asdict(replace(each, moments="")) for each in found], tables, arguments, "forces-friction.json")
 
 
+def slip(arguments: argparse.Namespace) -> None:
+    """Slip by sensors, each taking seconds; lines of forces-slip.jsonl are not made again."""
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    found = gel_slip.campaign(arguments.output / "forces-slip.jsonl")
+    text = gel_slip.slip_table(found)
+    print(f"{SLIP_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {SLIP_GROUP: text}, arguments, "forces-slip.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
@@ -396,6 +408,7 @@ def main() -> None:
         COVERAGE_GROUP: cover,
         REFERENCES_GROUP: refer,
         FRICTION_GROUP: grip,
+        SLIP_GROUP: slip,
     }
     every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)

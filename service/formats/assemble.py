@@ -16,6 +16,7 @@ from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
     ALONG_NORMAL,
+    BY_MOTION,
     NONE,
     BoolArray,
     FloatArray,
@@ -95,7 +96,7 @@ def _log(
     flat = not has_height and len(mapping.origins["displacement"].fields) == 2
     unseen = flat and not {"force", "contact"} & members.keys()
     if unseen:
-        metadata["contact"] = "estimated from motion"
+        metadata["contact"] = BY_MOTION
     if "element_area" not in members:
         members["element_area"] = np.array(element_area("position", members["position"]))
         metadata["element_area"] = "mean of the cells between the markers"

@@ -16,7 +16,7 @@ from service.formats.delimited import parse_number, rows, split_header, text_lin
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
-from slipcore.frames import UNNAMED, BoolArray, FloatArray, GraspLog
+from slipcore.frames import BY_MOTION, UNNAMED, BoolArray, FloatArray, GraspLog
 
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
@@ -316,7 +316,7 @@ def _grasp_log(
         own = lattice.occupied[..., None]
         log = replace(log, force=np.where(own, tracks.force[:, known][:, lattice.marker], 0.0))
     if unseen:
-        metadata = {**log.metadata, "contact": "estimated from motion"}
+        metadata = {**log.metadata, "contact": BY_MOTION}
         log = replace(log, contact=contact_by_motion(log.time, log.displacement), metadata=metadata)
     return _with_gripper(log, tracks.gripper_force, settings)
 

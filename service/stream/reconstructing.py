@@ -38,7 +38,8 @@ class Reconstructing:
 
     The first frame decides: with forces in it none are reconstructed, else there is a ``stream`` of them, or it is
     ``refused`` with this reason. Its contacts are sought in turns with those of other ``owner``s. ``noise`` N of normal
-    forces on elements in contact, as of the last frame with any.
+    forces on elements in contact, as of the last frame with any; ``deviation`` N of forces in the last frame, by which
+    a detector goes.
     """
 
     gel: Mapping[str, float | None]
@@ -46,6 +47,7 @@ class Reconstructing:
     stream: "ForceStream | None" = None
     refused: str | None = None
     noise: float = 0.0
+    deviation: float = 0.0
     failures: int = 0
 
     @property
@@ -102,9 +104,8 @@ class Reconstructing:
             raise
         except Exception:  # of a look beside the frames
             return self._without_look(frame, gripper_force, deviation)
-        forces, touching = found.forces, found.forces.contact
-        if touching.any():
-            self.noise = float(np.median(forces.deviation[..., 2][touching]))
+        forces = found.forces
+        self.noise, self.deviation = forces.force_noise or self.noise, found.force_deviation
         findings = [*at_end_of_range(found.saturated), *contradicted(self.stream.contradicted)]
         told = {
             "source": "reconstructed",
@@ -117,7 +118,7 @@ class Reconstructing:
             "findings": [asdict(finding) for finding in findings],
         }
         normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
-        return frame._replace(force=forces.force, normal=normal), told
+        return frame._replace(force=forces.force, normal=normal, contact=found.contact), told
 
     def _without_look(
         self, frame: Frame, gripper_force: float | None, deviation: float | None

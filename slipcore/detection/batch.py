@@ -35,10 +35,11 @@ def detect_slip(
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
     with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Forces that are clearly late, or
     have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
-    smoothed, as far as the log's noise shows how widely, unless options give it. A log without displacement is left to
-    method "forces_only" where the default would see nothing. ``options`` are the method's, and ``kernel_width`` of
-    ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their defaults. Raises
-    ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
+    smoothed, as far as the log's noise shows how widely, unless options give it, and takes the deviation of
+    reconstructed forces for noise that lasts. A log without displacement is left to method "forces_only" where the
+    default would see nothing. ``options`` are the method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the
+    sensor model knows of noise and smoothing goes before their defaults. Raises ``InvalidInput`` as ``init`` does, and
+    for a log of another lattice than the sensor model's.
     """
     if not log.sees_along_surface:
         allowed = "x and y of it, too: what moves along the normal alone shows neither slip nor friction"
@@ -48,6 +49,8 @@ def detect_slip(
     if sensor_model is not None:
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
+    if log.force_deviation and method == DEFAULT_METHOD:
+        options = {"force_floor": log.force_deviation, **options}
     log, mended = agreeing(log)
     kernel_width = options.pop("kernel_width", 0.0)
     estimated = {}

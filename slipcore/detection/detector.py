@@ -5,6 +5,7 @@ again; ``SlipDetector`` holds such a state, and ``batch.detect_slip`` is the fol
 """
 
 import math
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,6 +98,16 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
     return DetectorState(Setup(lattice, area, method, chosen, sensor), frame, None, memory, of_method, math.nan)
+
+
+def with_options(state: DetectorState, **options: float) -> DetectorState:
+    """The detector with other ``options`` from the next frame on; those not named stay.
+
+    Raises ``InvalidInput`` as ``init`` does.
+    """
+    setup = state.setup
+    chosen = asdict(setup.options) | options
+    return state._replace(setup=init(setup.lattice.position, setup.element_area, setup.method, **chosen).setup)
 
 
 def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[FloatArray, FloatArray]:
@@ -205,6 +216,10 @@ class SlipDetector:
     def findings(self) -> tuple[Finding, ...]:
         """What was found inconsistent in the frames so far."""
         return findings_by(self.state.setup.method, self.state.memory.common)
+
+    def set_options(self, **options: float) -> None:
+        """Go on with other ``options`` from the next frame on; those not named stay. Raises ``InvalidInput``."""
+        self.state = with_options(self.state, **options)
 
     def step(
         self,

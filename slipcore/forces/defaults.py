@@ -144,6 +144,8 @@ class ReconstructionDefaults(Options):
     rim_share: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.15
     """Of the largest normal force around an element, above which it is said to be in contact: else all that a contact
     covers a little would count."""
+    least_coupling: Annotated[float, Option(0.0, 10.0, "-", "ν 0.49: half-space 0.01, 5 mm 0.1 to 0.3")] = 0.03
+    """Motion of markers in the plane by a pressure over that by a shear, from which on they show where it presses."""
     covered: Annotated[float, Option(0.0, 1.0, "-", "its marker then lies inside")] = 0.5
     """Share of an element's area that must lie over the contact."""
     resultant_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 2e-3

@@ -143,7 +143,7 @@ def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
     shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
     variance = shown**2 + max(lasting, tuning.displacement_floor) ** 2  # a floor that is given is lasting noise, too
-    return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
+    return variance, math.hypot(tuning.force_noise_margin * known_or(pressing_noise, 0.0), tuning.force_floor)
 
 
 @compiled(inline=True)

@@ -50,6 +50,7 @@ class Tuning(NamedTuple):
     following_whole: float
     following_deviations: float
     force_noise_margin: float
+    force_floor: float
     force_smoothing: float
     ratio_spread: float
     ratio_difference: float

@@ -12,11 +12,12 @@ from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.strength import Criterion
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.recording import DisplacementData, error
-from slipcore.forces.tracking.frame_forces import FrameForces, Reader
+from slipcore.forces.tracking.frame_forces import FrameForces, Reader, typical_deviation
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
-from slipcore.frames import RECONSTRUCTED, BoolArray, FloatArray, GraspLog
+from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, FloatArray, GraspLog
+from slipcore.markers import contact_by_motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +33,8 @@ class Reconstruction:
     says which components of the resultant were known from elsewhere, and so count among data, and ``contradiction``
     [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN);
     ``saturated`` [t, n, m, 3]: displacements at the end of the sensor's range, taken as not seen; ``unnoticed`` [3] N:
-    forces that would move markers by no more than noise, as which nothing is taken where nothing touches.
+    forces that would move markers by no more than noise, as which nothing is taken where nothing touches;
+    ``shows_pressure``: False for markers in the plane on so thick a gel that they do not show where it presses.
     """
 
     force: FloatArray
@@ -48,6 +50,7 @@ class Reconstruction:
     contradiction: FloatArray
     saturated: BoolArray
     unnoticed: FloatArray
+    shows_pressure: bool = True
 
     @property
     def contradicted(self) -> float:
@@ -56,17 +59,31 @@ class Reconstruction:
         return float(contradicts(self.contradiction).sum() / known.sum()) if known.any() else 0.0
 
     def apply(self, log: GraspLog) -> GraspLog:
-        """The log with these forces, which its metadata call reconstructed; a detector finds the contact by them."""
+        """The log with these forces, which its metadata call reconstructed, and how unsure they are for a detector.
+
+        Unless the log knows it, the contact is that which was found where depth is seen, else a detector finds it by
+        the forces. Where markers do not show pressure it is by their motion, and no force is sure.
+        """
         if self.force.shape != log.displacement.shape:
             raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
-        return replace(log, force=self.force, normal=normal, metadata={**log.metadata, "force": RECONSTRUCTED})
+        deviation = self.force_noise if self.shows_pressure else float(np.abs(self.force).max())
+        told = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
+        contact = log.contact
+        if contact is None or log.metadata.get("contact") == BY_MOTION:
+            contact, told["contact"] = self._contact_of(log)
+        return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **told})
+
+    def _contact_of(self, log: GraspLog) -> tuple[BoolArray | None, str]:
+        """What a detector is told of it, and where it is from."""
+        if not self.shows_pressure:
+            return contact_by_motion(log.time, log.displacement), BY_MOTION
+        return self.contact if log.displacement[..., 2].any() else None, BY_FORCES
 
     @property
     def force_noise(self) -> float:
         """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
-        touching = self.deviation[..., 2][self.contact]
-        return float(np.median(touching)) if touching.size else 0.0
+        return typical_deviation(self.deviation, self.contact)
 
     @property
     def of_samples(self) -> dict[str, float]:
@@ -102,7 +119,7 @@ def reconstruct(
     known.check(name, gel, log.element_area * math.prod(log.grid))
     recording = _Recording(sensor, shown, known)
     touched, strongest = shown.touched(), shown.strongest()
-    result = _no_forces(log, shown, known.given, sensor.unnoticed(shown.noise))
+    result = _no_forces(log, shown, known.given, sensor)
     for t in map(int, np.flatnonzero(~touched)):
         _write_frame(result, t, FrameForces.unnoticed(log.grid, result.unnoticed, known[t]))
     if not touched.any():
@@ -141,7 +158,7 @@ class _Recording:
         return self.sensor.observation(spread, self.known[t]), self.sensor.data(data, self.known[t])
 
 
-def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, unnoticed: FloatArray) -> Reconstruction:
+def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, sensor: SensorResponse) -> Reconstruction:
     """Forces of zero, to be written to."""
     shape = log.displacement.shape
     return Reconstruction(
@@ -157,7 +174,8 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, unnotic
         given=given,
         contradiction=np.full((len(log), 3), np.nan),
         saturated=shown.saturated,
-        unnoticed=unnoticed,
+        unnoticed=sensor.unnoticed(shown.noise),
+        shows_pressure=sensor.shows_pressure,
     )
 
 

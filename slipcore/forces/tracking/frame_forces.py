@@ -27,6 +27,11 @@ class FrameForces:
     resultant_deviation: FloatArray
     contact: BoolArray
 
+    @property
+    def force_noise(self) -> float:
+        """As of a ``Reconstruction``, N."""
+        return typical_deviation(self.deviation, self.contact)
+
     @classmethod
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
         """Of a frame of which nothing is known yet."""
@@ -121,6 +126,12 @@ class Reader:
         noise = self.key.observation.noise
         residual = (data - self.response @ traction.ravel()) / noise
         return float(np.sqrt(max(1.0, residual @ residual / max(np.isfinite(noise).sum(), 1))))
+
+
+def typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:
+    """Median ``deviation`` [..., 3] N of normal forces on elements in ``contact`` [...], 0 without."""
+    touching = deviation[..., 2][contact]
+    return float(np.median(touching)) if touching.size else 0.0
 
 
 def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.forces.defaults import STRENGTH
+from slipcore.forces.defaults import RECONSTRUCTION, STRENGTH
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.prior import Smoothness, of_depth_alone, usual
 from slipcore.forces.operator.gel import Gel
@@ -21,7 +21,8 @@ class SensorResponse:
     seen, m, and the resultant, N; ``elements`` [e, k] N of theirs by tractions at nodes, and ``load`` N, the force by a
     traction of 1 at one node. ``observed_between`` [m + 3, 3, l] and ``elements_between`` [e, l]: the same of tractions
     that are largest midway between nodes. ``motion`` [3] m: by how much, in root mean square, markers move at
-    least where the gel bears a ``most`` N of load along each axis, on one element or on all alike.
+    least where the gel bears a ``most`` N of load along each axis, on one element or on all alike. ``shows_pressure``:
+    whether they show where it presses.
     """
 
     nodes: Nodes
@@ -33,6 +34,7 @@ class SensorResponse:
     elements_between: FloatArray
     motion: FloatArray
     most: float
+    shows_pressure: bool
 
     @classmethod
     def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "SensorResponse":
@@ -48,7 +50,9 @@ class SensorResponse:
         under = at_nodes[:-3, :, elements.any(axis=0)]
         most = STRENGTH.largest * load * under.shape[-1]
         over_between = young * between.over_elements(place)
-        return cls(nodes, at_nodes, elements, load, axes, midway, over_between, _least_motion(under, most / load), most)
+        least = _least_motion(under, most / load)
+        shown = 2 in axes or _shows_pressure(at_nodes[:-3])
+        return cls(nodes, at_nodes, elements, load, axes, midway, over_between, least, most, shown)
 
     def unnoticed(self, noise: float) -> FloatArray:
         """The largest resultant [3] N along each axis that moves markers by no more than their ``noise`` m; at most
@@ -94,6 +98,14 @@ class SensorResponse:
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:
         """What it measures [m + 3]."""
         return np.concatenate((displacement, np.nan_to_num(known.force)))
+
+
+def _shows_pressure(response: FloatArray) -> bool:
+    """Whether pressure moves markers in the plane by more than a small share of what shear does, by a ``response``
+    [m, 3, k] m.
+    """
+    motion = np.linalg.norm(response, axis=0)
+    return bool(np.median(motion[2] / motion[0]) > RECONSTRUCTION.least_coupling)
 
 
 def _least_motion(response: FloatArray, total: float) -> FloatArray:

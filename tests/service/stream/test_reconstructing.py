@@ -13,6 +13,7 @@ from service.stream import detectors, reconstructing
 from service.stream.detectors import PackedFrame
 from service.stream.messages import Control
 from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
+from slipcore.defaults import FilterOptions
 from slipcore.forces import ForceStream
 
 pytestmark = pytest.mark.usefixtures("looks_at_once")
@@ -56,6 +57,9 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
     session = opened(ramp, control=GRIP)
     reports = -ramp.force[..., 2].sum(axis=(1, 2))
     answers = [detectors.step("one", frame(ramp, k, gripper_force=reports[k]))[0] for k in range(len(ramp))]
+    assert session.forces is not None
+    assert isinstance(options := session.detector.state.setup.options, FilterOptions)
+    assert options.force_floor == session.forces.deviation == session.forces.noise  # as unsure as samples' forces
     assert [answer["force"]["wait_for"] for answer in answers[:14]] == ["noise"] * 14
     history = detect_slip(ramp)
     for k in (40, 60, 80):

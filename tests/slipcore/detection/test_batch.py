@@ -123,3 +123,19 @@ def test_what_was_not_observed_stays_unsaid_in_smoother(short_ramp: GraspLog) ->
 def test_a_lookahead_that_is_no_number_of_frames_is_refused(short_ramp: GraspLog, lookahead: object) -> None:
     with pytest.raises(InvalidInput, match="lookahead"):
         detect_slip(short_ramp, lookahead=lookahead)
+
+
+def test_what_reconstructed_forces_are_unsure_of_is_noise_that_lasts(scene: Scene, f1_score: Score) -> None:
+    """An error that stays from frame to frame had counted as a force ratio, and so as slip."""
+    log = scene("cond1", marker_noise=3e-6)
+    assert log.force is not None
+    assert log.truth is not None
+    wrong = log.force + 0.03 * np.random.default_rng(5).standard_normal((1, *log.force.shape[1:]))
+    told = {"force": "reconstructed", "force_deviation": "0.03"}
+    known = replace(log, force=wrong, contact=log.truth.contact, metadata=told)
+    found = detect_slip(known)
+    as_measured = detect_slip(replace(known, metadata={}))
+    np.testing.assert_array_equal(found.slip, detect_slip(replace(known, metadata={}), force_floor=0.03).slip)
+    alone = detect_slip(replace(known, force=None, metadata={}))
+    assert f1_score(log, found) > f1_score(log, alone) - 0.01
+    assert f1_score(log, found) > f1_score(log, as_measured) + 0.01

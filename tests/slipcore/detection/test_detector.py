@@ -32,6 +32,24 @@ RAMPS = {
 }
 
 
+def test_a_running_detector_goes_on_with_other_options(short_ramp: GraspLog) -> None:
+    """As what is known of its forces changes: those not named stay, as does what it has seen."""
+    detector = SlipDetector(short_ramp.position, short_ramp.element_area, contact_reach=0.9)
+    assert short_ramp.force is not None
+    for k in range(3):
+        detector.step(short_ramp.time[k], short_ramp.displacement[k], short_ramp.force[k])
+    before = detector.state
+    detector.set_options(force_floor=0.02)
+    opened_so = SlipDetector(short_ramp.position, short_ramp.element_area, contact_reach=0.9, force_floor=0.02).state
+    assert detector.state.setup.options == opened_so.setup.options
+    np.testing.assert_array_equal(detector.state.setup.sensor.settings, opened_so.setup.sensor.settings)
+    np.testing.assert_array_equal(detector.state.setup.sensor.touch_by_force, opened_so.setup.sensor.touch_by_force)
+    assert detector.state.memory is before.memory
+    with pytest.raises(InvalidInput, match="force_floor"):
+        detector.set_options(force_floor=-1.0)
+    detector.step(short_ramp.time[3], short_ramp.displacement[3], short_ramp.force[3])
+
+
 @pytest.mark.parametrize("name", RAMPS)
 def test_on_ramps_of_known_truth_the_corrected_method_is_good_and_beats_the_printed_one(
     name: str, f1_score: Score, stick_ratio_error: Score

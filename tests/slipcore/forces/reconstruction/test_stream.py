@@ -11,6 +11,7 @@ import pytest
 from slipcore import GraspLog, InvalidInput
 from slipcore.forces import ForceStream, Gel, StreamedForces, reconstruct
 from slipcore.forces.defaults import FORCE_STREAM
+from slipcore.markers import taken_along
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 LIGHT = [0, 0]
@@ -67,10 +68,28 @@ def test_forces_are_met_from_the_touch_on_and_end_with_it(pressed: Pressed) -> N
         assert each.forces.contact.any()
         assert (each.forces.deviation[each.forces.contact] > 0.0).all()
         assert (each.forces.resultant_deviation > 0.0).all()
+        assert each.contact is each.forces.contact
+        assert each.force_deviation == np.median(each.forces.deviation[each.forces.contact][:, 2])
     lifted = stream.step(10.0, still(log, 3, 99))
     assert not lifted.forces.force.any()
     assert lifted.forces.force.shape == found[-1].forces.force.shape
     assert lifted.wait_for is None
+    assert lifted.force_deviation == 0.0
+
+
+@pytest.mark.parametrize(("thickness", "shown"), [(5e-3, True), (np.inf, False)])
+def test_in_the_plane_of_a_thick_gel_a_detector_is_told_the_contact_by_motion(
+    pressed: Pressed, thickness: float, shown: bool
+) -> None:
+    log, beside = pressed([3, 3], noise=NOISE, axes=2, crop=AROUND), Later()
+    stream = ForceStream(log.position, log.element_area, replace(GEL, thickness=thickness), NOISE, beside)
+    assert stream.step(-0.1, still(log, 2, 0)).contact is None  # nothing is set up yet
+    beside.work()
+    for k in range(2):
+        contact = stream.step(0.1 * k, log.displacement[k]).contact
+        assert (contact is None) == shown
+        if contact is not None:
+            np.testing.assert_array_equal(contact, taken_along(log.displacement[k], NOISE))
 
 
 @pytest.mark.long

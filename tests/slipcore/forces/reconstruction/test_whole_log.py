@@ -12,6 +12,8 @@ from slipcore.forces import Gel, Reconstruction, reconstruct
 from slipcore.forces.inverse.support import better_support
 from slipcore.forces.recording import DisplacementData, least_power
 from slipcore.forces.tracking.sensor import SensorResponse
+from slipcore.frames import BY_FORCES, BY_MOTION
+from slipcore.markers import contact_by_motion
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 Pressed = Callable[..., GraspLog]
@@ -335,3 +337,34 @@ def test_noise_of_depth_alone_is_that_of_depth(pressed: Pressed) -> None:
     log = pressed([6] * 12, noise=2e-6)
     seen = replace(log, displacement=log.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
     assert DisplacementData.of(seen, None).noise == pytest.approx(2e-6, rel=0.2)
+
+
+def test_the_log_tells_how_unsure_its_reconstructed_forces_are(pressed: Pressed) -> None:
+    log = replace(pressed(LATE, noise=1e-5), force=None)
+    found = reconstruct(log, GEL, noise=1e-5)
+    known = found.apply(log)
+    assert known.force_deviation == pytest.approx(found.force_noise, rel=1e-3)
+    assert known.contact is not None
+    np.testing.assert_array_equal(known.contact, found.contact)
+    assert log.force_deviation == 0.0
+    for told in ("no number", "-1", "nan", "inf"):
+        assert replace(known, metadata={**known.metadata, "force_deviation": told}).force_deviation == 0.0
+
+
+@pytest.mark.parametrize(("thickness", "shown"), [(5e-3, True), (np.inf, False)])
+def test_in_the_plane_of_a_thick_gel_the_contact_is_by_motion(pressed: Pressed, thickness: float, shown: bool) -> None:
+    """Pressure hardly moves markers sideways there, and does not show where it acts."""
+    log = replace(pressed(LATE, noise=1e-6, axes=2), force=None)
+    found = reconstruct(log, replace(GEL, thickness=thickness), [9.0, 9.0], noise=1e-6)
+    assert found.shows_pressure == shown
+    contact = found.apply(log).contact
+    assert (contact is None) == shown
+    by_motion = contact_by_motion(log.time, log.displacement)
+    if contact is not None:
+        np.testing.assert_array_equal(contact, by_motion)
+    estimated = replace(log, contact=by_motion, metadata={"contact": BY_MOTION})
+    assert (found.apply(estimated).contact is None) == shown
+    assert found.apply(estimated).metadata["contact"] == (BY_FORCES if shown else BY_MOTION)
+    known = found.apply(replace(log, contact=~by_motion))
+    np.testing.assert_array_equal(known.contact, ~by_motion)
+    assert "contact" not in known.metadata
