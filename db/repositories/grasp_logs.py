@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, aliased, defer
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window, windowed
 from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
-from db.repositories import calibrations, copies, detections, jobs, sensors
+from db.repositories import calibrations, copies, detections, jobs, sensors, uploads
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
 _WHOLE = (
@@ -44,6 +44,7 @@ def add(session: Session, log: NewGraspLog) -> str:
         grid_columns=log.grid[1],
         uploaded_by=log.uploaded_by,
         calibration=calibrations.newest_version(session, sensor_id),
+        file_since=uploads.since(session),
     )
     try:
         with session.begin_nested():

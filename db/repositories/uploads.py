@@ -12,7 +12,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Interval, Select, and_, exists, func, literal, select, text, update
 from sqlalchemy.orm import Session, aliased
 
-from db.repositories import blobs
+from db.repositories import blobs, stores
 from db.tables import GraspLogRow, JobRow, now
 
 DONE_WITH = ("done", "refused", "cancelled")
@@ -31,8 +31,17 @@ def bring_back(session: Session, sha256: str) -> bool:
     lost = (GraspLogRow.sha256 == sha256, GraspLogRow.file_state.is_not(None))
     if session.scalar(select(GraspLogRow.id).where(*lost).limit(1)) is None:
         return False
-    session.execute(update(GraspLogRow).where(*lost).values(file_state=None, file_since=now()))
+    session.execute(update(GraspLogRow).where(*lost).values(file_state=None, file_since=since(session)))
     return True
+
+
+def since(session: Session) -> datetime:
+    """From when a file counts as there that comes in now: no earlier than a server last saw the clock.
+
+    It may come in by a machine whose own clock is behind.
+    """
+    seen = stores.seen_clock(session)
+    return now() if seen is None else max(now(), seen.at)
 
 
 def newest(session: Session) -> datetime | None:
@@ -42,15 +51,15 @@ def newest(session: Session) -> datetime | None:
 
 def follow_clock(session: Session, at: datetime, jump: timedelta) -> None:
     """Let no file be older by a clock that has jumped to ``at``: all go ahead with it, but none is newer than that."""
-    ahead, since = max(jump, timedelta()), GraspLogRow.file_since
-    _set_since(session, since > at - ahead, at)
+    ahead, there_since = max(jump, timedelta()), GraspLogRow.file_since
+    _set_since(session, there_since > at - ahead, at)
     if not ahead:
         return
     if session.connection().dialect.name == "postgresql":
-        _set_since(session, since <= at - ahead, since + literal(ahead, Interval()))
+        _set_since(session, there_since <= at - ahead, there_since + literal(ahead, Interval()))
     else:
-        later = func.strftime("%Y-%m-%d %H:%M:%f000", since, f"{ahead.total_seconds():.3f} seconds")
-        _set_since(session, since <= at - ahead, later)
+        later = func.strftime("%Y-%m-%d %H:%M:%f000", there_since, f"{ahead.total_seconds():.3f} seconds")
+        _set_since(session, there_since <= at - ahead, later)
 
 
 def _set_since(session: Session, those: ColumnElement[bool], since: datetime | ColumnElement[Any]) -> None:

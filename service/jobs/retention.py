@@ -93,7 +93,10 @@ class Retention:
 
     def start(self) -> None:
         """Begin, also where all is kept for good: the webhook and the command go by whether the clock was watched."""
-        self._look_at_the_clock()  # before anything is stored by it
+        try:
+            self._clock.begin()
+        except DatabaseError as error:
+            logger.warning("the clock is not looked at: %s", error)
         self._thread.start()
 
     async def stop(self) -> None:
@@ -102,10 +105,7 @@ class Retention:
 
     def _look(self) -> None:
         try:
-            if not self._leads():
-                self._clock = SteadyClock(self._database)  # others look meanwhile, so that an own look is not the last
-                return
-            if not self._clock.is_believed():
+            if not self._leads() or not self._clock.is_believed():
                 return
             if self._age is not None:
                 self._prune(self._age)
@@ -118,15 +118,12 @@ class Retention:
         except Exception:
             logger.exception("nothing old is deleted")
 
-    def _look_at_the_clock(self) -> None:
-        try:
-            self._clock.is_believed()
-        except DatabaseError as error:
-            logger.warning("the clock is not looked at: %s", error)
-
     def _prune(self, age: timedelta) -> None:
-        if deleted := prune(self._database, self._blobs, now() - age, lambda: self._thread.is_stopping):
+        if deleted := prune(self._database, self._blobs, now() - age, self._is_to_end):
             logger.info("deleted %d uploads older than %s", deleted, age)
+
+    def _is_to_end(self) -> bool:
+        return self._thread.is_stopping or not self._leads()
 
     def _forget_changes(self, age: timedelta) -> None:
         with self._database.write(durable=False) as session:
@@ -138,5 +135,5 @@ class Retention:
         self._next_garbage = time.monotonic() + GARBAGE_SECONDS
         if deleted := garbage.delete_set_aside(self._database, self._blobs, grace):
             logger.info("deleted %d files that nothing referred to for %s", deleted, grace)
-        if count := garbage.set_aside(self._database, self._blobs, stop=lambda: self._thread.is_stopping):
+        if count := garbage.set_aside(self._database, self._blobs, stop=self._is_to_end):
             logger.info("set %d files aside, to which nothing refers", count)

@@ -23,56 +23,56 @@ JUMP = timedelta(minutes=1)
 
 
 class Look(NamedTuple):
-    """What the clock that nobody sets said, s, and by how much the other was ahead of it, s."""
+    """What the clock said, ``at``, and what the one that nobody sets did then, s."""
 
+    at: datetime
     moment: float
-    ahead: float
 
 
 class SteadyClock:
     """Compares the clock with the one that nobody sets, at each look; the database remembers over restarts for how long
     it was steady.
 
-    Uploads go with it as it jumps ahead, since it may be right only now: none is older by that.
+    Uploads go with it as it jumps ahead, since it may be right only now: none is older by that. Where another
+    process has looked meanwhile, by a clock of its own maybe, the next look is as one after a restart.
     """
 
     def __init__(self, database: Database) -> None:
         self._database = database
         self._last: Look | None = None
 
+    def begin(self) -> None:
+        """Note the clock where no server has looked at it yet, before anything is stored by it."""
+        with self._database.write(durable=False) as session:
+            if stores.seen_clock(session, lock=True) is None:
+                stores.note_clock(session, SeenClock(now(), 0.0))
+
     def is_believed(self) -> bool:
         """Whether it has been steady for long enough while a server looked, none of them for longer than ``STEADY``
         apart.
         """
-        at, moment = now(), time.monotonic()
-        look = Look(moment, at.timestamp() - moment)
+        look = Look(now(), time.monotonic())
         with self._database.write(durable=False) as session:
-            seen = stores.seen_clock(session, lock=True)
-            if seen is None:
-                seen = SeenClock(at, 0.0)
-            elif (jump := self._jump(seen, look, at)) is not None:
+            seen = stores.seen_clock(session, lock=True) or SeenClock(look.at, 0.0)
+            last = self._last if self._last and self._last.at == seen.at else None  # else others looked meanwhile
+            jump = _jump(seen, last, look)
+            if jump is not None:
                 logger.warning("the clock has jumped by %s: nothing is deleted by its age for %s", jump, STEADY)
-                uploads.follow_clock(session, at, jump)
-                seen = SeenClock(at, 0.0)
-            else:
-                seen = seen._replace(at=at, steady=seen.steady + self._passed(seen, look, at))
+            uploads.follow_clock(session, look.at, jump or timedelta())
+            passed = 0.0 if last is None else look.moment - last.moment
+            seen = SeenClock(look.at, seen.steady + passed if jump is None else 0.0)
             stores.note_clock(session, seen)
         self._last = look
         return seen.steady >= STEADY.total_seconds()
 
-    def _jump(self, seen: SeenClock, look: Look, at: datetime) -> timedelta | None:
-        """By how much it is further than it would be; at a first look at least that. None where it is steady."""
-        if self._last is None:
-            jump = at - seen.at
-            return None if -JUMP <= jump <= STEADY else jump
-        jump = timedelta(seconds=look.ahead - self._last.ahead)
-        return jump if abs(jump) > JUMP else None
 
-    def _passed(self, seen: SeenClock, look: Look, at: datetime) -> float:
-        """Seconds since somebody, here or in another process, looked."""
-        if self._last is None:
-            return 0.0
-        return max(0.0, min(look.moment - self._last.moment, (at - seen.at).total_seconds()))
+def _jump(seen: SeenClock, last: Look | None, look: Look) -> timedelta | None:
+    """By how much it is further than it would be, without a last look at least that. None where it is steady."""
+    if last is None:
+        jump = look.at - seen.at
+        return None if -JUMP <= jump <= STEADY else jump
+    jump = look.at - last.at - timedelta(seconds=look.moment - last.moment)
+    return jump if abs(jump) > JUMP else None
 
 
 def doubt(session: Session) -> str | None:

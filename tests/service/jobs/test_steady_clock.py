@@ -157,6 +157,58 @@ def test_what_came_in_before_the_first_look_at_a_new_clock_counts_as_new(store: 
     assert since(store, log) == clocks.wall
 
 
+@pytest.mark.parametrize("looks", [0, 1, 3])
+def test_a_second_server_whose_clock_is_behind_makes_no_file_older(store: Database, clocks: Clocks, looks: int) -> None:
+    """At its start it had dated all files back, and the first deleted them once a day had passed by its own clock."""
+    first = believed(SteadyClock(store), clocks)
+    log, at = log_of(store, clocks), clocks.wall
+    clocks.wall -= timedelta(days=200)
+    second = SteadyClock(store)
+    second.begin()
+    for _ in range(looks):
+        look(second, clocks, timedelta())
+    clocks.wall += timedelta(days=200)
+    clocks.go(LOOK)
+    assert first.is_believed() == (looks == 0)
+    assert at <= since(store, log) <= clocks.wall
+
+
+@pytest.mark.parametrize("gone", [False, True])
+def test_a_file_that_comes_in_by_a_machine_whose_clock_is_behind_counts_as_new(
+    store: Database, clocks: Clocks, monkeypatch: pytest.MonkeyPatch, *, gone: bool
+) -> None:
+    """It had gone a minute later, by the clock of the machine that looks."""
+    believed(SteadyClock(store), clocks)
+    monkeypatch.setattr(uploads, "now", lambda: clocks.wall - timedelta(days=200))
+    with store.write() as session:
+        log = grasp_logs.add(session, NewGraspLog("0" * 64, 1, "npz", "x", None, "s", 2, 1.0, (2, 2)))
+        if gone:
+            session.execute(update(GraspLogRow).values(file_state="gone", file_since=BEGIN))
+            assert uploads.bring_back(session, "0" * 64)
+    assert since(store, log) == clocks.wall
+
+
+def test_a_file_of_a_machine_whose_clock_is_ahead_is_kept_no_longer_than_a_new_one(
+    store: Database, clocks: Clocks
+) -> None:
+    clock = believed(SteadyClock(store), clocks)
+    clocks.wall += timedelta(days=200)
+    log = log_of(store, clocks)
+    clocks.wall -= timedelta(days=200)
+    clocks.go(LOOK)
+    assert clock.is_believed()
+    assert since(store, log) == clocks.wall
+
+
+def test_a_clock_is_noted_before_the_first_look_at_a_new_store(store: Database, clocks: Clocks) -> None:
+    clocks.wall -= timedelta(days=200)
+    clock = SteadyClock(store)
+    clock.begin()
+    log = log_of(store, clocks)
+    look(clock, clocks, timedelta(days=200))
+    assert since(store, log) == clocks.wall
+
+
 def look(clock: SteadyClock, clocks: Clocks, by: timedelta) -> None:
     """The next look at a clock that has been set."""
     clocks.go(LOOK, by)
@@ -267,7 +319,7 @@ def test_a_look_overwrites_nothing_that_another_process_saw_meanwhile(
             asked.append(other.submit(note))
             wait(asked, timeout=0.2)
 
-        monkeypatch.setattr(clock, "_jump", jump)
+        monkeypatch.setattr(steady_clock, "_jump", jump)
         clock.is_believed()
         asked[0].result(30.0)
     with store.read() as session:
