@@ -9,6 +9,7 @@ that two parsers could read differently is refused.
 import asyncio
 import json
 from collections import Counter
+from heapq import nsmallest
 from http import HTTPStatus
 from time import perf_counter
 from typing import Any
@@ -43,6 +44,9 @@ MOST_PARAMETERS = 100
 OFFER_BYTES = 1024
 """Of the headers by which another protocol is asked for: they are parsed in Python, some of them byte by byte."""
 
+ROOM_SHARE = 0.05
+"""Of all connections that may be, which are let go together where there are too many: to choose them takes 1 ms."""
+
 REFUSAL_SECONDS = 0.5
 """s until what cannot be is refused: it takes no turn (``fair_starts``), and who sends nothing else is slow so."""
 
@@ -74,8 +78,8 @@ class _HoldingFlow(FlowControl):
 class BoundedConnection(asyncio.Protocol):
     """What is added to either of the server's own protocols: its bounds, and its refusals as problem details.
 
-    An address may have ``per_address`` connections, and all together ``limit_concurrency``; beyond that the one makes
-    room that was idle for longest, in all of the address that has most.
+    An address may have ``per_address`` connections; beyond that the one that was idle for longest makes room. All
+    together may have ``limit_concurrency``; beyond that several do, of the addresses that have most.
     """
 
     transport: asyncio.Transport
@@ -252,28 +256,30 @@ class BoundedConnection(asyncio.Protocol):
             if len(held) > self._per_address:
                 self._is_beyond = not self._close_one(held)
                 return
-        if self._most is not None and count > self._most:
-            self._close_one(self._of_largest_address())
-
-    def _of_largest_address(self) -> list[Any]:
-        """Of the addresses that have a connection which makes room, the connections of the one that has most."""
-        addresses = Counter(map(_address, self.connections))
-        unneeded = {_address(each) for each in self.connections if each is not self and _is_unneeded(each)}
-        largest = max(unneeded, key=addresses.__getitem__, default=None)
-        return [each for each in self.connections if _address(each) == largest]
+        if self._most is not None and count > self._most and len(staying := self._staying()) > self._most:
+            addresses = Counter(map(_address, staying))
+            unneeded = [each for each in staying if each is not self and _is_unneeded(each)]
+            several = max(1, int(ROOM_SHARE * self._most))
+            for each in nsmallest(several, unneeded, key=lambda each: (-addresses[_address(each)], _need(each))):
+                _let_go(each)
 
     def _close_one(self, held: list[Any]) -> bool:
         """Close one that is closing with what its client does not read, or the longest idle; whether there is one."""
         unneeded = [each for each in held if each is not self and _is_unneeded(each)]
         if not unneeded:
             return False
-        least = min(unneeded, key=lambda each: (not each.transport.is_closing(), getattr(each, "idle_since", 0.0)))
-        least.is_let_go = True
-        if _has_unsent(least):
-            least.transport.abort()
-        else:
-            least.transport.close()
+        _let_go(min(unneeded, key=_need))
         return True
+
+    def _has_room(self) -> bool:
+        """Whether another request may be answered."""
+        if self._most is None or max(len(self.connections), len(self.tasks)) <= self._most:
+            return True
+        return max(len(self._staying()), len(self.tasks)) <= self._most
+
+    def _staying(self) -> list[Any]:
+        """All but those that were let go, which are among the connections until the loop's next round."""
+        return [each for each in self.connections if not getattr(each, "is_let_go", False)]
 
     def _wait_for_headers(self) -> None:
         self._header_timer = self.loop.call_later(HEADER_SECONDS, self.transport.close)
@@ -294,7 +300,7 @@ class BoundedConnection(asyncio.Protocol):
     def _refusal(self, scope: Scope) -> Refusal | None:
         if self._is_beyond:
             return TOO_MANY_CONNECTIONS, "this address has as many as it may; try again later"
-        if self._most is not None and max(len(self.connections) - 1, len(self.tasks) - 1) >= self._most:
+        if not self._has_room():
             return TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later"
         if len(scope["headers"]) > MOST_HEADERS:
             return HEADERS_TOO_LARGE, f"{len(scope['headers'])} headers; allowed: at most {MOST_HEADERS}"
@@ -318,6 +324,19 @@ def _address(connection: Any) -> str | None:
 def _has_unsent(connection: Any) -> bool:
     """Whether its client has not read all that it was sent, which stays in memory until then."""
     return bool(connection.transport.get_write_buffer_size() > 0)
+
+
+def _need(connection: Any) -> tuple[bool, float]:
+    """By which those that make room are ordered: first who is closing and not read, then the longest idle."""
+    return not connection.transport.is_closing(), getattr(connection, "idle_since", 0.0)
+
+
+def _let_go(connection: Any) -> None:
+    connection.is_let_go = True
+    if _has_unsent(connection):
+        connection.transport.abort()
+    else:
+        connection.transport.close()
 
 
 def _is_idle(connection: Any) -> bool:
