@@ -4,10 +4,11 @@ Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: 
 fit by least squares; then fits of the same material, asked for one after the other: by `bayes`, and by `conjugate`,
 which is a job with next to nothing to compute. Then look-ups on 32 connections, beside bare Starlette routes that
 return the same bytes by the same uvicorn, without a log, on h11 and asyncio and on httptools and uvloop: requests a
-second, CPU seconds a request of the server, and latencies, alone, while uploads run, the same from a process for
-look-ups (STICTION_LOOKUP_PORT), and where each asks the database. What answers look-ups has one core; the callers, the
-workers and, beside a process for look-ups, the server share the others.
-Writes service.json and service.png.
+second, CPU seconds a request of the server, and latencies, alone and where each asks the database. Last, the same
+while uploads and fits go on, by the server and from a process for look-ups (STICTION_LOOKUP_PORT), in turn with the
+bare route on the same core: what that has is the machine's own (`--only beside`). What answers look-ups has one core;
+the callers, the workers and, beside a process for look-ups, the server share the others.
+Writes service.json and service.png, or beside.json.
 """
 
 import os
@@ -37,6 +38,7 @@ from benchmarks.service.http_load import (
     in_turn,
     leave_first_core,
     load,
+    median,
     pin,
 )
 from benchmarks.service.postgresql import running_postgresql
@@ -49,7 +51,7 @@ MATERIAL = "benchmark"
 LOOK_UP = f"/v1/materials/{MATERIAL}/friction?v=0.001&fn=0.05&quantile=0.05"
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 UPLOADS = 30
-MOST_BESIDE = 200
+MOST_BESIDE = 300
 """Logs made before look-ups are measured beside their uploads: to make them takes the same cores."""
 
 FAST = "bare Starlette, httptools and uvloop"
@@ -156,7 +158,7 @@ def requests(url: str, what: str, ask: Callable[[httpx.Client, Any], str], bodie
     return Requests(what, accepted, fitted)
 
 
-def beside(work: Callable[[], object], measured: Callable[[], Load]) -> Load:
+def beside(work: Callable[[], object], measured: Callable[[], list[list[Load]]]) -> list[list[Load]]:
     """A measurement while other work goes on."""
     done = Event()
 
@@ -211,8 +213,6 @@ def measure() -> tuple[list[Requests], list[Load]]:
             fits(url, "conjugate", UPLOADS),
         ]
         loads = looked_up(url, port, process)
-    bodies = [content(300 + MOST_BESIDE + k) for k in range(MOST_BESIDE)]
-    loads.append(looked_up_apart(bodies))
     uncached = {"STICTION_LOOKUP_SECONDS": "0"}
     with serving(**uncached) as (_, port, process):
         loads.append(load(Target("look-up, asking SQLite", port, process, LOOK_UP)))
@@ -228,39 +228,53 @@ def measure() -> tuple[list[Requests], list[Load]]:
 def looked_up(url: str, port: int, process: int) -> list[Load]:
     """Look-ups of a model in memory, and of the same bytes from a bare route."""
     answer = httpx.get(url + LOOK_UP).raise_for_status()
-    with bare(answer.content, "h11", "asyncio") as slow, bare(answer.content, "httptools", "uvloop") as quick:
+    with bare(answer.content, "h11", "asyncio") as slow, bare(answer.content) as quick:
         targets = [
             Target(FAST, *quick, LOOK_UP),
             Target("look-up", port, process, LOOK_UP),
             Target("look-up, not modified", port, process, LOOK_UP, f"If-None-Match: {answer.headers['etag']}"),
             Target("bare Starlette, h11 and asyncio", *slow, LOOK_UP),
         ]
-        alone = in_turn(targets)
-    busy = Target("look-up beside uploads and fits", port, process, LOOK_UP)
-    bodies = [content(300 + k) for k in range(MOST_BESIDE)]
-    return [*alone, beside_uploads(url, bodies, busy)]
+        return [median(runs) for runs in in_turn(targets)]
 
 
-def looked_up_apart(bodies: list[bytes]) -> Load:
-    """Look-ups from a process for them, which has a core of its own, while the server takes uploads."""
+def looked_up_beside() -> list[list[Load]]:
+    """Look-ups while one log after the other is uploaded and fitted, and a bare route beside the same uploads."""
+    return [*beside_of_the_server(made_logs(300)), *beside_of_a_process(made_logs(300 + MOST_BESIDE))]
+
+
+def beside_of_the_server(bodies: list[bytes]) -> list[list[Load]]:
+    """Look-ups of the server itself; the bare route shares its core with it."""
+    with serving() as (url, port, process):
+        return beside_uploads(url, bodies, Target("look-up", port, process, LOOK_UP), "on the server's core")
+
+
+def beside_of_a_process(bodies: list[bytes]) -> list[list[Load]]:
+    """Look-ups from a process for them, which has a core of its own, as the bare route has then."""
     port = free_port()
     with informed(STICTION_LOOKUP_PORT=str(port)) as (url, _, server):
-        own = f"http://127.0.0.1:{port}"
-        httpx.get(own + LOOK_UP, timeout=60.0).raise_for_status()  # waits for its start
+        httpx.get(f"http://127.0.0.1:{port}{LOOK_UP}", timeout=60.0).raise_for_status()  # waits for its start
         process = child_listening(server, port)
         pin(process)
-        what = "look-up beside uploads and fits, from a process for look-ups"
-        return beside_uploads(url, bodies, Target(what, port, process, LOOK_UP))
+        target = Target("look-up, from a process for look-ups", port, process, LOOK_UP)
+        return beside_uploads(url, bodies, target, "on that core")
 
 
-def beside_uploads(url: str, bodies: list[bytes], target: Target) -> Load:
-    """What look-ups take while one log after the other is uploaded and fitted."""
-    left = iter(bodies)
-    return beside(lambda: uploads(url, [next(left)]), lambda: in_turn([target], 3, 5.0)[0])
+def made_logs(first_seed: int) -> list[bytes]:
+    """As many as are uploaded beside look-ups at most."""
+    return [content(first_seed + k) for k in range(MOST_BESIDE)]
+
+
+def beside_uploads(url: str, bodies: list[bytes], target: Target, where: str) -> list[list[Load]]:
+    """What look-ups take while one log after the other is uploaded and fitted, and a bare route of the same answer."""
+    left, answer = iter(bodies), httpx.get(f"http://127.0.0.1:{target.port}{LOOK_UP}").raise_for_status()
+    with bare(answer.content) as quick:
+        targets = [target, Target(f"bare Starlette, {where}", *quick, LOOK_UP)]
+        return beside(lambda: uploads(url, [next(left)]), lambda: in_turn(targets, 3, 5.0))
 
 
 @contextmanager
-def bare(body: bytes, parser: str, loop: str) -> Iterator[tuple[int, int]]:
+def bare(body: bytes, parser: str = "httptools", loop: str = "uvloop") -> Iterator[tuple[int, int]]:
     """A server of one route that always gives the same answer: its port and process."""
     port = free_port()
     with running([sys.executable, "-c", BARE, str(port), parser, loop], port, body) as process:
@@ -305,11 +319,33 @@ def tables(found: list[Requests], loads: list[Load]) -> dict[str, str]:
     return {"uploads": "\n".join(first), "look-ups": "\n".join(second)}
 
 
+def table_beside(runs: list[list[Load]]) -> dict[str, str]:
+    """Look-ups beside uploads as Markdown, with the ratio of their percentiles in each run."""
+    rows = [
+        f"| beside uploads and fits, {len(runs[0])} runs of each | requests/s | CPU a request | p50 | p99 | of p50 |"
+    ]
+    rows.append("|---|---|---|---|---|---|")
+    for each in runs:
+        e, ratios = median(each), ", ".join(f"{one.p99 / one.p50:.1f}" for one in each)
+        times = f"{1e6 * e.cpu:.0f} µs | {1e3 * e.p50:.1f} ms | {1e3 * e.p99:.1f} ms"
+        rows.append(f"| {e.what} | {e.rate:.0f} | {times} | {ratios} |")
+    return {"look-ups beside uploads": "\n".join(rows)}
+
+
 def main() -> None:
     """Measure, print, write."""
-    arguments = options(__doc__).parse_args()
+    parser = options(__doc__)
+    parser.add_argument("--only", choices=("alone", "beside"), help="leave out the other")
+    arguments = parser.parse_args()
     pictures = picture_folder(arguments)
     leave_first_core()
+    if arguments.only != "alone":
+        runs = looked_up_beside()
+        made = table_beside(runs)
+        print(*made.values())
+        write([[asdict(one) for one in each] for each in runs], made, arguments, "beside.json")
+    if arguments.only == "beside":
+        return
     found, loads = measure()
     made = tables(found, loads)
     print("\n\n".join(made.values()))

@@ -66,16 +66,16 @@ def load(target: Target, seconds: float = 3.0) -> Load:
     return Load(target.what, count / taken, (cpu_seconds(target.process) - before) / count, p50, p99)
 
 
-def in_turn(targets: list[Target], rounds: int = 5, seconds: float = 3.0) -> list[Load]:
-    """Each target once a round, so that all see the same hours of the machine; the medians."""
+def in_turn(targets: list[Target], rounds: int = 5, seconds: float = 3.0) -> list[list[Load]]:
+    """Each target once a round, so that all see the same hours of the machine; the rounds of each."""
     runs = [[load(target, seconds) for target in targets] for _ in range(rounds)]
-    return [
-        Load(
-            target.what,
-            *(float(np.median([getattr(run[k], name) for run in runs])) for name in ("rate", "cpu", "p50", "p99")),
-        )
-        for k, target in enumerate(targets)
-    ]
+    return [list(each) for each in zip(*runs, strict=True)]
+
+
+def median(runs: list[Load]) -> Load:
+    """The medians of several runs of one target."""
+    names = ("rate", "cpu", "p50", "p99")
+    return Load(runs[0].what, *(float(np.median([getattr(run, name) for run in runs])) for name in names))
 
 
 def leave_first_core() -> None:
