@@ -8,8 +8,9 @@ ten other materials. Counted over all cases: answered at all; force over that of
 planned_force.json.
 
 `--nested`: instead, logs come one by one, and each material is fitted after each of them as the service does. Counted
-are the steps by which an answer vanishes, and by which the friction that a planner may count on falls by more than a
-twentieth, and whether the log that did it is named. Writes planned_force_nested.json.
+are the steps by which an answer vanishes, how often a new grasp would have slipped under it, and the steps by which the
+friction that a planner may count on falls by more than a twentieth, and whether the log that did it is named. Writes
+planned_force_nested.json.
 """
 
 import os
@@ -120,14 +121,17 @@ def row(found: Sequence[Case]) -> list[object]:
 
 
 class Step(NamedTuple):
-    """One more log of a material, from so many ``logs``: loads ``answered`` before, how many of these ``vanished``;
-    whether the friction that may be counted on ``fell`` by more than a twentieth, a log is ``named``, and it is the
-    newest.
+    """One more log of a material, from so many ``logs``: loads ``answered`` before, how many of these ``vanished``, and
+    of these under ``light`` loads, that half of the gripper's force holds in the hand of who knows all; the sum of
+    probabilities of ``slip`` under the forces that vanished, over that asked; whether the friction that may be counted
+    on ``fell`` by more than a twentieth, a log is ``named``, and it is the newest.
     """
 
     logs: int
     answered: int
     vanished: int
+    light: int
+    slip: float
     fell: bool
     named: bool
     newest: bool
@@ -138,43 +142,53 @@ def steps(seed: int, median: float) -> list[Step]:
     rng = np.random.default_rng([seed, round(1e6 * median)])
     kind = scatters(drawn(median, rng))
     moments = {str(k): Moments.from_samples(grasp(kind, rng)) for k in range(NESTED[-1][1] + 1)}
-    loads = np.array([load_of(kind, float(force), ASKED[0]) for force in rng.uniform(*FORCES, LOADS)])
-    found, before, held = list[Step](), None, np.zeros(LOADS, dtype=bool)
+    least = rng.uniform(*FORCES, LOADS)
+    loads = np.array([load_of(kind, float(force), ASKED[0]) for force in least])
+    found, before, held = list[Step](), None, np.full(LOADS, np.inf)
     for count in range(1, len(moments) + 1):
         logs = dict(list(moments.items())[:count])
         model = estimators.fit(list(logs.values()), method="hierarchical")
         forces = required_normal_force(of_planner(model), loads, ASKED[0], **ASKED_OF).normal_force
-        holds = np.isfinite(forces)
         if before is not None:
             (model,) = with_weakening([model], {model.method: to_new_model(before)}, logs, ScatterPrior())
             at = WorkingPoint(0.5 * sum(before.domain.normal_force))
             fell = counted_on(model, at) < (1.0 - INFLUENCE.fall) * counted_on(before, at)
             log = model.diagnostics.get(LOG)
-            lost = int(np.count_nonzero(held & ~holds))
-            answered = int(np.count_nonzero(held))
-            found.append(Step(count - 1, answered, lost, fell, log is not None, log == str(count - 1)))
-        before, held = model, holds
+            answered = np.isfinite(held)
+            lost = answered & ~np.isfinite(forces)
+            slip = sum(slips(kind, load, force) for load, force in zip(loads[lost], held[lost], strict=True)) / ASKED[0]
+            light = int(np.count_nonzero(lost & (least <= 0.5 * LIMIT)))
+            counts = int(np.count_nonzero(answered)), int(np.count_nonzero(lost)), light
+            found.append(Step(count - 1, *counts, slip, fell, log is not None, log == str(count - 1)))
+        before, held = model, forces
     return found
 
 
 def nested_row(first: int, last: int, found: Sequence[Step]) -> list[object]:
-    """Of the steps from ``first`` to ``last`` logs: answers that vanish, %; steps in which some do, and of a fall."""
+    """Of the steps from ``first`` to ``last`` logs: answers that vanish, %, how many of them under light loads, and how
+    often they slipped over what was asked; steps in which some do, and of a fall.
+    """
     chosen = [each for each in found if first <= each.logs <= last]
     vanishing = [each for each in chosen if each.vanished]
     fallen = [each for each in chosen if each.fell]
-    share = sum(each.vanished for each in chosen) / max(sum(each.answered for each in chosen), 1)
-    told = [f"{100.0 * share:.2f}", f"{100.0 * len(vanishing) / len(chosen):.2f}"]
+    vanished = sum(each.vanished for each in chosen)
+    share = vanished / max(sum(each.answered for each in chosen), 1)
+    told = [f"{100.0 * share:.2f}", f"{sum(each.light for each in chosen)} of {vanished}"]
+    told += [f"{sum(each.slip for each in chosen) / max(vanished, 1):.1f}"]
+    told += [f"{100.0 * len(vanishing) / len(chosen):.2f}"]
     told += [f"{sum(each.named for each in vanishing)} of {len(vanishing)}"]
     told += [f"{100.0 * len(fallen) / len(chosen):.2f}", f"{sum(each.named for each in fallen)} of {len(fallen)}"]
     return [f"{first} to {last}", len(chosen), *told, sum(each.newest for each in fallen)]
 
 
-NESTED = ((1, 1), (2, 4), (5, 11), (12, 19))
-"""Steps that are counted together, by the logs before them."""
+NESTED = ((1, 1), (2, 4), (5, 11), (12, 19), (1, 19))
+"""Steps that are counted together, by the logs before them; the last are all."""
 NESTED_COLUMNS = (
     "logs before",
     "steps",
     "answers that vanish, %",
+    f"of loads that {0.5 * LIMIT:g} N hold",
+    "they slipped, over asked",
     "steps with one, %",
     "log named",
     "steps with a fall, %",

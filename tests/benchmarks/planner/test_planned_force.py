@@ -29,16 +29,17 @@ def test_a_row_counts_what_was_not_answered() -> None:
 
 def test_steps_that_lose_answers_are_counted_with_what_was_named() -> None:
     came = [
-        Step(2, 20, 0, fell=False, named=False, newest=False),
-        Step(3, 20, 5, fell=True, named=True, newest=True),
-        Step(4, 10, 1, fell=False, named=False, newest=False),
-        Step(5, 20, 20, fell=True, named=True, newest=True),
+        Step(2, 20, 0, 0, 0.0, fell=False, named=False, newest=False),
+        Step(3, 20, 5, 2, 12.0, fell=True, named=True, newest=True),
+        Step(4, 10, 1, 1, 3.0, fell=False, named=False, newest=False),
+        Step(5, 20, 20, 9, 9.0, fell=True, named=True, newest=True),
     ]
-    assert nested_row(2, 4, came) == ["2 to 4", 3, "12.00", "66.67", "1 of 2", "33.33", "1 of 1", 1]
+    told = ["2 to 4", 3, "12.00", "3 of 6", "2.5", "66.67", "1 of 2", "33.33", "1 of 1", 1]
+    assert nested_row(2, 4, came) == told
 
 
 @pytest.mark.long
 def test_a_material_is_followed_log_by_log() -> None:
     found = steps(0, 0.05)
     assert [each.logs for each in found] == list(range(1, 20))
-    assert all(each.vanished <= each.answered <= 20 for each in found)
+    assert all(each.light <= each.vanished <= each.answered <= 20 for each in found)
