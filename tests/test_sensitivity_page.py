@@ -32,6 +32,7 @@ ENTRIES = {
         "force_to_noise least_coupling",
         "of friction and slip, which no press gives",
     ),
+    "slipcore.forces.RESPONSE": ("digits", "which offsets are evaluated once, no result"),
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor", "0 but of reconstructed forces, whose deviation it is"),

@@ -7,10 +7,10 @@ mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the mar
 which is then wrong. It is also learnt from presses (benchmarks/forces/presses.py), frames are followed as they come
 (benchmarks/forces/stream.py), displacement is cut at the end of a range (benchmarks/forces/saturation.py), an
 independent solver's scenes are read (benchmarks/forces/references.py), grasps are taken to friction and slip with
-the gripper's force alone (benchmarks/forces/friction.py), and slip is found on other sensors
-(benchmarks/forces/slip.py). In the plane the normal force on a half-space is given. Peers are given the same
-displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
-often stated intervals of 95 % hold the truth is reported for each group.
+the gripper's force alone (benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py),
+and maps of height are read (benchmarks/forces/height_maps.py). In the plane the normal force on a half-space is given.
+Peers are given the same displacements. Errors are those of resultants, of the field of forces on elements, and their
+growth with noise; how often stated intervals of 95 % hold the truth is reported for each group.
 
 `--export FOLDER` writes the cases on which peers are tried as `.npz`; `--external NAME=FOLDER` scores what another
 method made of them: files of the same names, with `force` [t, n, m, 3] N. Writes forces-GROUP.json, prints a
@@ -34,6 +34,7 @@ from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
 from benchmarks.forces import friction as gel_friction
+from benchmarks.forces import height_maps as gel_height_maps
 from benchmarks.forces import presses as gel_presses
 from benchmarks.forces import references as gel_references
 from benchmarks.forces import saturation as gel_saturation
@@ -65,7 +66,7 @@ STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
-SLIP_GROUP = "slip by sensor"
+SLIP_GROUP, HEIGHT_GROUP = "slip by sensor", "height maps"
 COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
@@ -397,6 +398,14 @@ def slip(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {SLIP_GROUP: text}, arguments, "forces-slip.json")
 
 
+def see_depth(arguments: argparse.Namespace) -> None:
+    """Normal forces by maps of height."""
+    found = [gel_height_maps.outcome(*case) for case in gel_height_maps.cases()]
+    text = gel_height_maps.height_table(found)
+    print(f"{HEIGHT_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {HEIGHT_GROUP: text}, arguments, "forces-height-maps.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
@@ -409,6 +418,7 @@ def main() -> None:
         REFERENCES_GROUP: refer,
         FRICTION_GROUP: grip,
         SLIP_GROUP: slip,
+        HEIGHT_GROUP: see_depth,
     }
     every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)

@@ -41,6 +41,8 @@ class ResponseDefaults(Options):
     """How many times smaller cells are near a node."""
     near: Annotated[int, Option(1, 100, "pitches", "beyond, the coarser cells do as well")] = 3
     """Within which they are."""
+    digits: Annotated[int, Option(3, 12, "decimals", "far below what a spline misses")] = 9
+    """Of a cell, to which offsets of markers from nodes that are alike agree; each is evaluated once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

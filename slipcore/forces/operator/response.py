@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import convolve1d, map_coordinates, spline_filter
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
@@ -28,24 +29,39 @@ def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
     return response_matrices(gel, [nodes], position)[0]
 
 
-def response_matrices(gel: Gel, lattices: Sequence[Nodes], position: FloatArray) -> list[FloatArray]:
-    """``response_matrix`` of several lattices of nodes of one pitch."""
+def response_matrices(
+    gel: Gel, lattices: Sequence[Nodes], position: FloatArray, axes: Sequence[int] = (0, 1, 2)
+) -> list[FloatArray]:
+    """``response_matrix`` of several lattices of nodes of one pitch, of displacement along some ``axes`` alone."""
     pitch, cells, finer = lattices[0].grid.pitch[0], RESPONSE.cells, RESPONSE.finer
-    offsets = [(position[:, None, :] - nodes.places()[None]) / (pitch / cells) for nodes in lattices]
+    shapes = [(len(position), len(nodes)) for nodes in lattices]
+    offsets, places = zip(*(_offsets(position, nodes.places(), pitch / cells) for nodes in lattices), strict=True)
     reach = int(np.ceil(max(np.abs(offset).max() for offset in offsets))) + 3  # a cubic spline ends three cells beyond
     close = RESPONSE.near * cells
     far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
     middle = (slice(reach - close, reach + close + 1),) * 2
-    matrices = [np.empty((3, len(position), 3, len(nodes))) for nodes in lattices]
+    matrices = [np.empty((len(axes), markers, 3, count)) for markers, count in shapes]
     for component, table in far.items():
+        directions = [(axes.index(to), by) for to, by in _directions(component) if to in axes]
+        if not directions:
+            continue
         table[middle] = near[component][::finer, ::finer]
         spline = spline_filter(table, order=3, mode="mirror")
-        for matrix, offset in zip(matrices, offsets, strict=True):
-            at = [offset[..., 1] + reach, offset[..., 0] + reach]
-            value = map_coordinates(spline, at, order=3, mode="mirror", prefilter=False)
-            for to, by in _places(component):
+        for matrix, offset, place in zip(matrices, offsets, places, strict=True):
+            value = map_coordinates(spline, (offset + reach).T[::-1], order=3, mode="mirror", prefilter=False)[place]
+            for to, by in directions:
                 matrix[to, :, by] = value
     return matrices
+
+
+def _offsets(position: FloatArray, places: FloatArray, cell: float) -> tuple[FloatArray, NDArray[np.intp]]:
+    """How far markers [j, 2] m lie from nodes at ``places`` [k, 2] m, each offset [d, 2] once, in cells, and which of
+    them a pair has, [j, k]: on a lattice most are alike.
+    """
+    apart = (position[:, None, :] - places[None]).reshape(-1, 2) / cell
+    alike = np.round(apart, RESPONSE.digits) @ np.array([1.0, 1.0j])
+    _, first, which = np.unique(alike, return_index=True, return_inverse=True)
+    return apart[first], which.reshape(len(position), len(places))
 
 
 def hat_responses(gel: Gel, pitch: float, cells: int, reach: int) -> dict[Below, FloatArray]:
@@ -73,7 +89,7 @@ def cell_responses(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
     return surface | {"xz": -surface["zx"], "yz": -surface["zy"]}
 
 
-def _places(component: Below) -> tuple[tuple[int, int], ...]:
+def _directions(component: Below) -> tuple[tuple[int, int], ...]:
     """Directions of displacement and of traction that a component couples."""
     to, by = ("xyz".index(letter) for letter in component.replace("n", "z"))
     return ((to, by), (by, to)) if component == "xy" else ((to, by),)

@@ -43,8 +43,7 @@ class SensorResponse:
         nodes, young = Nodes.around(place, element_area), gel.young_modulus
         load, between = young * nodes.area, nodes.between
         at_nodes, midway = (
-            _observed(young * response[list(axes)], load)
-            for response in response_matrices(gel, (nodes, between), place)
+            _observed(young * response, load) for response in response_matrices(gel, (nodes, between), place, axes)
         )
         elements = young * nodes.over_elements(place)
         under = at_nodes[:-3, :, elements.any(axis=0)]

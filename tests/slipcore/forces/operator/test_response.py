@@ -1,13 +1,17 @@
 """Displacement of markers by traction on nodes."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from slipcore import InvalidInput
 from slipcore.forces.defaults import NODES as OF_NODES
+from slipcore.forces.operator import response
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
-from slipcore.forces.operator.response import response_matrix
+from slipcore.forces.operator.response import response_matrices, response_matrix
 
 PITCH = 0.5e-3
 LINE = PITCH * (np.arange(9) - 4.0)
@@ -101,3 +105,23 @@ def test_nodes_lie_about_the_markers_wherever_these_are(away: tuple[float, float
     places = Nodes.around(position, 1e-6).places()
     np.testing.assert_allclose(places.min(axis=0), position.min(axis=0) - 1e-3 * OF_NODES.margin, atol=1e-12)
     np.testing.assert_allclose(places.max(axis=0), position.max(axis=0) + 1e-3 * OF_NODES.margin, atol=1e-12)
+
+
+def test_offsets_that_are_alike_are_evaluated_once_and_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a lattice as far from its nodes as its neighbours are, most are."""
+    gel = Gel(1e6, 0.45, 3e-3)
+    lattice = np.stack(np.meshgrid(1e-3 * np.arange(6), 1e-3 * np.arange(5)), axis=-1).reshape(-1, 2)
+    nodes = Nodes.around(lattice, 1e-6)
+    evaluated = []
+
+    def counted(table: np.ndarray, at: np.ndarray, **options: Any) -> np.ndarray:
+        evaluated.append(np.shape(at)[1])
+        return map_coordinates(table, at, **options)
+
+    monkeypatch.setattr(response, "map_coordinates", counted)
+    whole = response_matrix(gel, nodes, lattice)
+    assert set(evaluated) == {(6 + 14 - 1) * (5 + 13 - 1)}  # four rows of nodes beyond the markers on each side
+    for k in (0, 17):
+        np.testing.assert_allclose(response_matrix(gel, nodes, lattice[[k]])[:, 0], whole[:, k], rtol=1e-6, atol=1e-14)
+    (along_normal,) = response_matrices(gel, [nodes], lattice, axes=(2,))
+    np.testing.assert_array_equal(along_normal, whole[2:])
