@@ -1,9 +1,14 @@
 """Signs of life of a command that takes longer than a moment."""
 
+import os
+import re
+import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
+from traceback import walk_stack
+from types import FrameType
 from typing import TypeVar
 
 import typer
@@ -11,6 +16,11 @@ import typer
 MOMENT = 1.0
 """Seconds after which a user wants to know that something is going on."""
 
+AGAIN = 0.05
+"""Seconds after which an interrupt that came within the compiler is sent once more."""
+
+COMPILER = re.compile(r"[/\\\\](llvmlite|numba)[/\\\\]")
+"""Whose code an exception may not pass: it is called from C++, which loses it or ends the process."""
 
 Thing = TypeVar("Thing")
 
@@ -54,7 +64,7 @@ def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
 def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
     """Say on standard error what is being done, once a second; nothing if it is done in a moment.
 
-    Gives whom to tell the part that is done (``Line.tell``).
+    Gives whom to tell the part that is done (``Line.tell``), who raises ``KeyboardInterrupt`` where one was lost.
     """
     done, line = threading.Event(), Line(doing)
 
@@ -65,11 +75,43 @@ def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
     try:
-        yield line.tell
+        with _noted_interrupts() as came:
+
+            def tell(part: float, doing: str | None = None) -> None:
+                if came.is_set():
+                    raise KeyboardInterrupt
+                line.tell(part, doing)
+
+            yield tell
     finally:
         done.set()
         thread.join()
         line.end()
+
+
+@contextmanager
+def _noted_interrupts() -> Iterator[threading.Event]:
+    """Set once Ctrl-C came, which is raised only once no kernel is being compiled or loaded."""
+    came, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.set()
+        if any(COMPILER.search(each.f_code.co_filename) for each, _ in walk_stack(frame)):
+            threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+        else:
+            signal.default_int_handler(number, frame)
+
+    if before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield came
+    except Exception as error:
+        if came.is_set():
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        if signal.getsignal(signal.SIGINT) is note:
+            signal.signal(signal.SIGINT, before)
 
 
 def _rounded(seconds: float) -> str:

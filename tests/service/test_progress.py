@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -96,6 +98,44 @@ def test_an_interrupted_command_leaves_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.fixture
+def heeds_interrupts() -> Iterator[None]:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("heeds_interrupts")
+def test_an_interrupt_that_is_lost_while_kernels_load_is_raised_where_progress_is_told() -> None:
+    with pytest.raises(KeyboardInterrupt), shown_progress("thinking") as tell:  # noqa: PT012
+        tell(0.2)
+        with suppress(KeyboardInterrupt):  # as a callback of ctypes does
+            signal.raise_signal(signal.SIGINT)
+        tell(0.3)
+        pytest.fail("gone on")
+
+
+@pytest.mark.usefixtures("heeds_interrupts")
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_a_failure_that_an_interrupt_has_caused_is_an_interrupt(interrupted: bool) -> None:
+    with pytest.raises(KeyboardInterrupt if interrupted else RuntimeError), shown_progress("thinking"):  # noqa: PT012
+        if interrupted:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        raise RuntimeError("no kernel")
+
+
+@pytest.mark.usefixtures("heeds_interrupts")
+@pytest.mark.parametrize("compiler", ["llvmlite", "numba"])
+def test_an_interrupt_within_the_compiler_is_raised_once_it_is_left(compiler: str) -> None:
+    interrupt = "signal.raise_signal(signal.SIGINT); left.append(True)"
+    within = {"signal": signal, "left": []}
+    with pytest.raises(KeyboardInterrupt), shown_progress("thinking"):  # noqa: PT012
+        exec(compile(interrupt, f"packages/{compiler}/engine.py", "exec"), within)
+        assert within["left"]
+        time.sleep(30.0)
+
+
 HEED_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 """What a shell starts in the background ignores them, and so does all that is started by that: these tests, perhaps."""
 
@@ -111,7 +151,7 @@ def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(t
             _, told = process.communicate(timeout=60.0)
         finally:
             process.kill()
-    assert process.returncode == INTERRUPTED
+    assert process.returncode == INTERRUPTED, told.decode()
     kept = list(tmp_path.iterdir())
     assert kept in ([], [tmp_path / "log.npz"])  # the best until then, if there was any, and whole
     for log in kept:
