@@ -291,7 +291,10 @@ def friction(name: str, question: Mapping[str, float | str | None]) -> Call[Fric
     """Look friction up."""
     asked = _given(**question)
     answer = _record(FrictionAnswer.from_json, (yield from _get(f"/v1/materials/{_part(name)}/friction", asked)))
-    _require_same({ECHOED[each]: value for each, value in asked.items() if each in ECHOED}, answer)
+    told = {ECHOED[each]: value for each, value in asked.items() if each in ECHOED}
+    if told.get("of") == "element":
+        told.pop("elements", None)  # of one, whatever was said
+    _require_same(told, answer)
     yield from _require_named(name, answer.material)
     return answer
 

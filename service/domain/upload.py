@@ -114,8 +114,7 @@ async def received(
     _check_type(request.content_type)
     encoding = check_encoding(request.content_encoding)
     in_thread = partial(context.threads.run, request.principal.share)
-    await in_thread(context.require_room)
-    material_id = await in_thread(_check, context, request)
+    material_id = await in_thread(_check_before, context, request)
     with ExitStack() as spools:
         body = spools.enter_context(context.blobs.spool())
         await context.bodies.receive(body, chunks, limit, in_thread)
@@ -310,6 +309,12 @@ def _material(session: Session, settings: Settings, received: ReceivedLog) -> in
     material_id = materials.still(session, material_id)
     check_may_add(session, material_id, principal)
     return material_id
+
+
+def _check_before(context: Context, request: UploadRequest) -> int | None:
+    """The same, and whether there is room for them."""
+    context.require_room()
+    return _check(context, request)
 
 
 def _check(context: Context, request: UploadRequest) -> int | None:

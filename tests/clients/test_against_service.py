@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,11 @@ def test_a_grasp_becomes_a_model_that_both_sides_evaluate_alike(call: Call, name
         assert answer.within_domain == (model.extrapolation(0.0, force) is None)
     grip = required_normal_force(model, 1.0, contact_area=6e-5)
     assert grip.normal_force > 1.0 / 0.45  # simulated with μ = 0.4
+    call("rename_material", name, f"{name}2"[-100:])
+    for of, elements, method, area in product(("element", "contact", None), (60, None), ("ols", "auto"), (1e-7, None)):
+        if (of, elements) != ("contact", None):
+            told = call("friction", name, 1e-3, force, 0.05, method, of=of, elements=elements, element_area=area)
+            assert told.material == f"{name}2"[-100:], "it answers to its old name, and to every question"
 
 
 def test_the_same_log_twice_is_one_log(call: Call, name: str, grasp: GraspLog) -> None:

@@ -713,6 +713,13 @@ def test_friction_that_was_not_asked_for_is_refused_by_name(
         ask(service(answers.friction | told | change), "friction", "paper", v, 0.05, **question)
 
 
+def test_of_one_element_the_number_of_a_contact_s_is_not_told(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    told = answers.friction | {"of": "element", "elements": 1}
+    assert ask(service(told), "friction", "paper", 0.0, 0.05, 0.05, of="element", elements=60).of == "element"
+
+
 def test_who_leaves_the_method_to_the_service_takes_any(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     assert ask(service(answers.friction), "friction", "paper", 0.0, 0.05, 0.05, "auto").method == "ols"
 
