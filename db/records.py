@@ -254,8 +254,8 @@ class Detection:
     log, None where an older version did not look for any; ``contact_friction``: None where nothing is known of it.
     ``calibration``: the version of its sensor's by which the log was corrected, and in ``corrections`` how; None where
     there was none. ``gel``: the mechanics of its sensor's gel as they were described then; None also where an older
-    version did not note them. ``fingerprint``: the same in all logs of one grasp, None where an older version did not
-    take it.
+    version did not note them. ``fingerprint``: the same in all logs of the same measurements, None where an older
+    version did not take it; ``alike``: those of other logs that it shares most frames with, None of none.
     """
 
     method: str
@@ -275,6 +275,7 @@ class Detection:
     corrections: tuple[str, ...] | None = None
     gel: Gel | None = None
     fingerprint: str | None = None
+    alike: tuple[str, ...] | None = None
 
 
 class SeenClock(NamedTuple):

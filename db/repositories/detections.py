@@ -64,14 +64,14 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     ]
 
 
-def others_of_grasp(session: Session, log_id: str, fingerprint: str) -> list[str]:
-    """Ids of other logs of the same grasp and material, not withdrawn and with samples, in the order they were sent."""
+def others_of_grasp(session: Session, log_id: str, fingerprints: Collection[str]) -> list[str]:
+    """Ids of other logs of its material with one of these, in the order they were sent: not withdrawn, with samples."""
     own = select(GraspLogRow.material_id, GraspLogRow.sha256).where(GraspLogRow.id == log_id)
     material_id, sha256 = session.execute(own).one()
     if material_id is None:
         return []
     query = select(GraspLogRow.id).join(SampleSummaryRow).join(DetectionRow)
-    same = (DetectionRow.fingerprint == fingerprint, GraspLogRow.sha256 != sha256)
+    same = (DetectionRow.fingerprint.in_(fingerprints), GraspLogRow.sha256 != sha256)
     ordered = query.where(*_that_count(material_id), *same).order_by(GraspLogRow.number, GraspLogRow.id)
     return list(session.scalars(ordered))
 
@@ -112,14 +112,6 @@ def fingerprints(session: Session, log_ids: Collection[str]) -> list[str]:
     return [each for each in found if each is not None]
 
 
-def set_fingerprint(session: Session, material_id: int, before: Collection[str], fingerprint: str) -> bool:
-    """Give all logs of a material with the fingerprints ``before`` this one; whether there are any."""
-    of_material = select(GraspLogRow.id).where(GraspLogRow.material_id == material_id)
-    theirs = (DetectionRow.grasp_log_id.in_(of_material), DetectionRow.fingerprint.in_(before))
-    changed = update(DetectionRow).where(*theirs).values(fingerprint=fingerprint)
-    return bool(session.scalars(changed.returning(DetectionRow.grasp_log_id)).all())
-
-
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
     """The same of its newest logs, newest first; of a log that went through several detectors, as it was sent last."""
     newest = _samples(material_id).add_columns(GraspLogRow.grid_rows, GraspLogRow.grid_columns)
@@ -138,11 +130,13 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     """Contents of the same grasp as another that has more samples, or as many and was sent earlier; by the content of
     that one.
 
-    A content may have several fingerprints, by several detectors or from merged materials: they are of one grasp.
+    A content may have several fingerprints, by several detectors or from merged materials: they are of one grasp. So
+    are those that it is alike while it is among the rows: two grasps that one recording holds are two without it.
     """
     counts: dict[str, int] = {}  # of each content, as it was sent last
     marks: dict[str, str] = {}  # the first fingerprint of each, in the order in which they were sent
     joined: dict[str, str] = {}  # fingerprints, by others of the same grasp
+    there = {row.fingerprint for row in rows}
 
     def grasp(mark: str) -> str:
         while mark in joined:
@@ -151,10 +145,12 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
 
     for row in sorted(rows, key=lambda row: (row.number, row.id)):
         counts[row.sha256] = row.samples
-        if row.fingerprint is not None:
-            of_content, own = grasp(marks.setdefault(row.sha256, row.fingerprint)), grasp(row.fingerprint)
-            if own != of_content:
-                joined[own] = of_content
+        if row.fingerprint is None:
+            continue
+        for mark in there.intersection([row.fingerprint, *(row.alike or ())]):
+            of_content, other = grasp(marks.setdefault(row.sha256, row.fingerprint)), grasp(mark)
+            if other != of_content:
+                joined[other] = of_content
     groups: dict[str, list[str]] = {}
     for content, mark in marks.items():
         groups.setdefault(grasp(mark), []).append(content)
@@ -173,6 +169,7 @@ def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
             SampleSummaryRow.moments,
             DetectionRow.findings,
             DetectionRow.fingerprint,
+            DetectionRow.alike,
             DetectionRow.signature.is_not(None).label("has_signature"),
             SensorRow.name.label("sensor"),
             GraspLogRow.created_at,

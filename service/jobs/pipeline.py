@@ -190,7 +190,7 @@ def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSum
     """Store what was found in a log, of this fingerprint and signature, as that of the grasp that it is of.
 
     It is compared while others may write, and once more with what they stored of its material meanwhile. Logs that it
-    shows to be of one grasp are of one from then on: parts of it that came before need not be alike.
+    shows to be of one grasp are of one as long as it counts: parts of it that came before need not be alike.
     """
     compared, alike = set[str](), list[str]()
     while True:
@@ -199,16 +199,14 @@ def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSum
             alike += find_alike(content, detections.signatures(session, others))
         compared.update(others)
         with run.database.write() as session:
-            material_id = materials_of_logs.hold(session, log_id)
+            materials_of_logs.hold(session, log_id)
             jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
             if not compared.issuperset(detections.known_again(session, log_id, MOST_LOGS)):
                 continue
-            mark, *joined = dict.fromkeys([*detections.fingerprints(session, alike), own])
-            if material_id and summary.count and detections.set_fingerprint(session, material_id, joined, mark):
-                friction_models.mark_outdated(session, material_id)  # fewer of them count, also without this one
-            copied = same_grasp(detections.others_of_grasp(session, log_id, mark))
+            marks = dict.fromkeys([*detections.fingerprints(session, alike), own])
+            copied = same_grasp(detections.others_of_grasp(session, log_id, marks))
             findings = (*stored_findings(copied), *(detection.findings or ()))
-            found = replace(detection, fingerprint=mark, findings=findings)
+            found = replace(detection, alike=tuple(each for each in marks if each != own) or None, findings=findings)
             detections.add(session, log_id, found, summary, content)
             jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
             return

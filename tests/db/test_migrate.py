@@ -408,6 +408,7 @@ def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callabl
 @pytest.mark.parametrize(
     ("revision", "told"),
     [
+        ("0029", "1 logs that share frames with others would be lost"),
         ("0026", "1 signatures of grasps would be lost"),
         ("0025", "1 signatures of grasps, 1 fingerprints of grasps would be lost"),
         ("0022", "1 fingerprints of grasps, 1 calibrations of sensors would be lost"),
@@ -431,7 +432,7 @@ def test_what_the_way_back_would_lose_is_named_and_kept(
     fill()
     found = [{"name": "zero offset", "evidence": "", "remedy": ""}]
     with database.write() as session:
-        session.execute(update(DetectionRow).values(findings=found, fingerprint="1" * 64, signature=b"f"))
+        session.execute(update(DetectionRow).values(findings=found, fingerprint="1" * 64, signature=b"f", alike=["2"]))
         session.execute(update(GraspLogRow).values(withdrawn_at=now(), withdrawn_because="wet"))
         session.execute(update(SensorRow).values(young_modulus=1e5, poisson_ratio=0.45))
         materials.add_alias(session, 1, "A4")

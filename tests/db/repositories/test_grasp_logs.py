@@ -137,8 +137,8 @@ def test_of_logs_of_one_grasp_the_first_that_is_not_withdrawn_counts(
     alone: dict[str, tuple[str, ...]] = {ids[name]: () for name in "cdf"}
     assert counted() == alone | {ids["a"]: (ids["b"],)}
     with database.write() as session:
-        assert detections.others_of_grasp(session, ids["b"], "1" * 64) == [ids["a"]]
-        assert detections.others_of_grasp(session, ids["e"], "1" * 64) == []
+        assert detections.others_of_grasp(session, ids["b"], ["1" * 64]) == [ids["a"]]
+        assert detections.others_of_grasp(session, ids["e"], ["1" * 64]) == []
         grasp_logs.withdraw(session, ids["a"], "the sensor was wet")
     assert counted() == alone | {ids["b"]: ()}
 
@@ -182,19 +182,41 @@ def test_grasps_that_share_a_content_are_one(
     assert newest.samples.grasp_log_id == ids[2]
 
 
-def test_a_fingerprint_is_set_in_its_material_alone(
-    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+@pytest.mark.parametrize("whole_comes", ["first", "last"])
+def test_grasps_that_one_recording_holds_are_one_beside_it_alone(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    whole_comes: str,
 ) -> None:
+    """They had been one grasp for good, also once the recording, which had been sent by mistake, was withdrawn."""
     with database.write() as session:
-        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
-    ids = [add(database, new_log(material)) for material in (paper, paper, paper, steel)]
+        paper = materials.create(session, "paper", "").id
+    ids = [add(database, new_log(paper)) for _ in range(4)]
+    marks = [str(number) * 64 for number in range(4)]
+    whole = 0 if whole_comes == "first" else 3
+    for number, (log_id, mark) in enumerate(zip(ids, marks, strict=True)):
+        others = marks[:3] if number == whole == 3 else marks[:1] if number > whole else []
+        found = replace(detection, fingerprint=mark, alike=tuple(others) or None)
+        with database.write() as session:
+            detections.add(session, log_id, found, replace(samples, count=500 if number == whole else 100))
+
+    def counted() -> dict[str, tuple[str, ...]]:
+        with database.read() as session:
+            found = detections.samples_of_material(session, paper)
+            newest = [log.samples.grasp_log_id for log in detections.newest_sampled_logs(session, paper, 9)]
+        assert sorted(newest) == sorted(part.grasp_log_id for part in found)
+        return {part.grasp_log_id: part.copies for part in found}
+
+    cuts = tuple(each for each in ids if each != ids[whole])
+    assert counted() == {ids[whole]: cuts}
     with database.write() as session:
-        for number, log_id in reversed(list(enumerate(ids))):
-            detections.add(session, log_id, replace(detection, fingerprint=str(number % 3) * 64), samples)
-        assert detections.fingerprints(session, [ids[2], ids[0]]) == ["0" * 64, "2" * 64]
-        assert detections.set_fingerprint(session, paper, ["0" * 64, "2" * 64], "3" * 64)
-        assert not detections.set_fingerprint(session, paper, ["0" * 64], "3" * 64)
-        assert detections.fingerprints(session, ids) == [mark * 64 for mark in "3130"]
+        grasp_logs.withdraw(session, ids[whole], "sent by mistake")
+    assert counted() == dict.fromkeys(cuts, ())
+    with database.write() as session:
+        assert grasp_logs.restore(session, ids[whole])
+    assert counted() == {ids[whole]: cuts}
 
 
 def test_logs_without_a_material_are_no_copies_of_each_other(
@@ -203,7 +225,7 @@ def test_logs_without_a_material_are_no_copies_of_each_other(
     first, second = (add(database, new_log()) for _ in range(2))
     with database.write() as session:
         detections.add(session, first, replace(detection, fingerprint="1" * 64), samples)
-        assert detections.others_of_grasp(session, second, "1" * 64) == []
+        assert detections.others_of_grasp(session, second, ["1" * 64]) == []
 
 
 def test_signatures_of_the_other_logs_of_a_material_come_newest_first(

@@ -1,0 +1,22 @@
+"""Of which other logs a log has the frames, which until now had all the same fingerprint for good."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0030"
+down_revision = "0029"
+branch_labels = None
+depends_on = None
+
+LOST_ON_THE_WAY_BACK = (
+    ("logs that share frames with others", "SELECT count(*) FROM detections WHERE alike IS NOT NULL"),
+)
+
+
+def upgrade() -> None:
+    op.add_column("detections", sa.Column("alike", sa.JSON(), nullable=True))
+
+
+def downgrade() -> None:
+    with op.batch_alter_table("detections") as table:
+        table.drop_column("alike")
