@@ -139,7 +139,7 @@ def _from_heights(
     if "displacement" in members and (mapping.rest is not None or mapping.is_of_places):
         _from_rest(members, mapping.at_rest(str(frame)), metadata)
     elements = _elements_of(members, mapping.pixel, grid, pixels)
-    risen, seen = height_maps.rise(height, height[frame], elements.shares(pixels, mapping.pixel))
+    risen, seen = height_maps.rise(height, frame, elements, mapping.pixel)
     if not seen.any():
         raise InvalidInput(
             "height", f"of {pixels[0]} × {pixels[1]} pixels, none of an element", "maps over the elements"

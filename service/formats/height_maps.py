@@ -5,7 +5,6 @@ the camera. By how much a pixel rose since rest is averaged over each element's 
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,6 @@ from service.formats import rest as rests
 from service.formats.members import Members
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 LEAST_SEEN = 0.5
 """Share of an element's area whose height is known, at rest and in a frame, under which it is not observed there."""
@@ -41,28 +37,19 @@ class Elements:
         """Of each, m²."""
         return self.sides[0] * self.sides[1]
 
-    def shares(self, pixels: tuple[int, int], pixel: float) -> "csr_array":
-        """Shares of the elements' areas that lie on each pixel, [n · m, rows · columns]."""
-        from scipy.sparse import csr_array  # few files need it
+    def corners(self, pixels: tuple[int, int], pixel: float) -> FloatArray:
+        """Rows and columns of their corners on a map, in pixels from its edge and none beyond, [2, 4, n · m].
 
-        values, columns, ends = [np.empty(0)], [np.empty(0, dtype=np.int64)], [0]
-        for x, y in self.position[..., :2].reshape(-1, 2):
-            row, column = _shares(y, self.sides[1], pixels[0], pixel), _shares(x, self.sides[0], pixels[1], pixel)
-            i, j = np.flatnonzero(row), np.flatnonzero(column)
-            values.append(np.outer(row[i], column[j]).ravel())
-            columns.append((i[:, None] * pixels[1] + j).ravel())
-            ends.append(ends[-1] + len(i) * len(j))
-        shape = (len(ends) - 1, pixels[0] * pixels[1])
-        return csr_array((np.concatenate(values), np.concatenate(columns), ends), shape=shape)
+        First the one of least row and column, then the others around.
+        """
+        x, y = np.moveaxis(self.position[..., :2].reshape(-1, 2), -1, 0) / pixel
+        wide, high = (0.5 * side / pixel for side in self.sides)
+        rows = np.stack([y - high, y - high, y + high, y + high]) + 0.5 * pixels[0]
+        columns = np.stack([x - wide, x + wide, x + wide, x - wide]) + 0.5 * pixels[1]
+        return np.stack([np.clip(rows, 0, pixels[0]), np.clip(columns, 0, pixels[1])])
 
 
-def _shares(middle: float, side: float, count: int, pixel: float) -> FloatArray:
-    """Of the interval about ``middle`` m, the share that lies on each of so many pixels, [count]."""
-    edge = pixel * (np.arange(count + 1) - 0.5 * count)
-    return np.asarray(np.diff(np.clip(edge, middle - 0.5 * side, middle + 0.5 * side)) / side)
-
-
-def maps_of(height: NDArray[np.floating], pixels: tuple[int, int] | None) -> FloatArray:
+def maps_of(height: NDArray[np.floating], pixels: tuple[int, int] | None) -> NDArray[np.floating]:
     """Maps [t, rows, columns] m, NaN where nothing is seen, of ones that may be flat; raises ``InvalidInput``."""
     if height.ndim == 2 and pixels is not None and height.shape[1] == pixels[0] * pixels[1]:
         height = height.reshape(len(height), *pixels)
@@ -71,27 +58,45 @@ def maps_of(height: NDArray[np.floating], pixels: tuple[int, int] | None) -> Flo
         raise InvalidInput(
             "height", f"of shape {list(height.shape)}", f"{wanted}, or flat with `pixels` in the mapping"
         )
-    return np.where(np.isfinite(height), height, np.nan)
+    return height
 
 
-def frame_at_rest(rest: str | None, height: FloatArray, members: Members) -> int:
+def frame_at_rest(rest: str | None, height: NDArray[np.floating], members: Members) -> int:
     """The frame that ``rest`` names, the first where it names none; of the least contact that in which the surface
     stands highest, where neither contact nor force is known. Raises ``InvalidInput`` for what is none.
     """
     load = rests.load_of(members)
     if load is None and rest == rests.LEAST_CONTACT:
-        always = np.isfinite(height).all(axis=0)
+        always = np.ones(height.shape[1:], dtype=bool)
+        for each in height:
+            always &= np.isfinite(each)
         if not always.any():
             raise InvalidInput("rest", f"{rest}, with no pixel seen in all frames", rests.ALLOWED)
-        load = -height[:, always].mean(axis=1)
+        load = np.array([-each[always].mean(dtype=np.float64) for each in height])
     return rests.frame_of(rest or rests.FIRST, len(height), load, np.empty(0))
 
 
-def rise(height: FloatArray, zero: FloatArray, shares: "csr_array") -> tuple[FloatArray, BoolArray]:
-    """Mean rise [t, e] m of elements since the map ``zero`` [rows, columns] m, and which were seen [t, e]."""
-    risen = (height - zero).reshape(len(height), -1)
-    known = np.isfinite(risen)
-    area = (shares @ known.T.astype(np.float64)).T
-    total = (shares @ np.where(known, risen, 0.0).T).T
-    seen = area >= LEAST_SEEN
-    return np.divide(total, area, out=np.zeros_like(total), where=seen), seen
+def rise(height: NDArray[np.floating], frame: int, elements: Elements, pixel: float) -> tuple[FloatArray, BoolArray]:
+    """Mean rise [t, e] m of elements since a ``frame`` of ``height`` [t, rows, columns] m, and which were seen [t, e].
+
+    A map at a time, by its sums over all that lies before each of their corners.
+    """
+    corners = elements.corners((height.shape[1], height.shape[2]), pixel)
+    pixels = elements.area / pixel**2
+    mean, share = np.empty((2, len(height), corners.shape[-1]))
+    for t, each in enumerate(height):
+        risen = each.astype(np.float64) - height[frame]
+        known = np.isfinite(risen)
+        share[t] = _sum_within(corners, known.astype(np.float64)) / pixels
+        mean[t] = _sum_within(corners, np.where(known, risen, 0.0)) / pixels
+    seen = share >= LEAST_SEEN
+    return np.divide(mean, share, out=np.zeros_like(mean), where=seen), seen
+
+
+def _sum_within(corners: FloatArray, values: FloatArray) -> FloatArray:
+    """Of ``values`` [rows, columns], weighted by how much of each pixel lies within the corners, [e]."""
+    from scipy.ndimage import map_coordinates  # few files need it
+
+    before = np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    first, right, opposite, below = map_coordinates(before, corners, order=1)
+    return np.asarray(first - right + opposite - below)

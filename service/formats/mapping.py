@@ -46,6 +46,9 @@ PRESSURE_ALONE = (
 LARGEST = 1e300
 """Of any number: a whole one may have more digits than a float can hold."""
 
+PIXELS = (1e-9, 0.1)
+"""m, of which a pixel of a map of height may be wide; sensors' are 10 to 100 µm."""
+
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
 MAPPED = (*DTYPES, "height")
@@ -152,7 +155,7 @@ def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
         origins={name: _required(name, told, _origin(name, given[name], topic)) for name in MAPPED if name in given},
         grid=_grid("grid", given["grid"], "markers") if "grid" in given else None,
         pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
-        pixel=_positive("pixel", given["pixel"]) if "pixel" in given else None,
+        pixel=_pixel(given["pixel"]) if "pixel" in given else None,
         pixels=_grid("pixels", given["pixels"], "pixels") if "pixels" in given else None,
         tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
         episode=_episode(given["episode"]) if "episode" in given else None,
@@ -233,6 +236,12 @@ def _grid(name: str, value: Any, of: str) -> tuple[int, int]:
 def _positive(name: str, value: Any) -> float:
     if type(value) not in (int, float) or not 0.0 < value <= LARGEST:
         raise InvalidInput(name, repr(value)[:60], "a number above 0")
+    return float(value)
+
+
+def _pixel(value: Any) -> float:
+    if _positive("pixel", value) < PIXELS[0] or value > PIXELS[1]:
+        raise InvalidInput("pixel", f"{value:g} m", f"{PIXELS[0]:g} to {PIXELS[1]:g} m (is it in m?)")
     return float(value)
 
 

@@ -1,6 +1,7 @@
 """Maps of height: what elements under them move by, and what is not seen."""
 
 import json
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from service import formats
 from service.formats.height_maps import Elements, rise
+from service.formats.reading import WORKING_FACTOR
 from slipcore import InvalidInput, detect_slip
 from slipcore.frames import FloatArray
 
@@ -62,10 +64,30 @@ def test_depth_in_mm_has_a_unit_that_turns_it(tmp_path: Path) -> None:
 def test_elements_between_pixels_weigh_them_by_area() -> None:
     """Of three pixels in two elements, the middle one counts half for each."""
     elements = Elements.dividing((1, 3), 1.0, (1, 2))
-    np.testing.assert_allclose(elements.shares((1, 3), 1.0).toarray(), [[2 / 3, 1 / 3, 0], [0, 1 / 3, 2 / 3]])
-    risen, seen = rise(np.array([[[3.0, 6.0, np.nan]]]), np.zeros((1, 3)), elements.shares((1, 3), 1.0))
-    np.testing.assert_allclose(risen, [[4.0, 0.0]])
-    np.testing.assert_array_equal(seen, [[True, False]])
+    np.testing.assert_allclose(elements.corners((1, 3), 1.0)[1], [[0.0, 1.5], [1.5, 3.0], [1.5, 3.0], [0.0, 1.5]])
+    risen, seen = rise(np.array([[[0.0, 0.0, 0.0]], [[3.0, 6.0, np.nan]]]), 0, elements, 1.0)
+    np.testing.assert_allclose(risen[1], [4.0, 0.0])
+    np.testing.assert_array_equal(seen[1], [True, False])
+
+
+@pytest.mark.parametrize("side", [1e-4, 0.03], ids=["small", "of the map"])
+def test_maps_take_no_more_memory_than_is_counted_with(tmp_path: Path, side: float) -> None:
+    """They took 17 times their bytes, and 260 kB of them 2 GB where each of many elements covers the map."""
+    at = np.stack(np.broadcast_arrays(1e-4 * np.arange(60), 1e-4 * np.arange(60)[:, None], 0.0), axis=-1)
+    told: dict[str, Any] = {"height": {"field": "depth", "unit": "mm"}, "position": "at", "element_area": "area"}
+    path = file_of(tmp_path, np.zeros((40, 240, 320), dtype="f4"), told | {"grid": [60, 60]}, at=at, area=side**2)
+    formats.read(path)  # imports
+    tracemalloc.start()
+    formats.read(path)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most <= WORKING_FACTOR * 40 * 240 * 320 * 4
+
+
+@pytest.mark.parametrize("pixel", [1e-320, 25.0, 1e300])
+def test_a_pixel_in_another_unit_is_refused(tmp_path: Path, pixel: float) -> None:
+    with pytest.raises(InvalidInput, match="is it in m"):
+        formats.read(file_of(tmp_path, np.zeros((2, *PIXELS)), {"pixel": pixel}))
 
 
 def test_missing_pixels_do_not_let_a_curved_rest_show(tmp_path: Path) -> None:
