@@ -81,6 +81,16 @@ class NoiseDefaults(Options):
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
     """Noise that lasts from frame to frame from which a finding reports it; less may be the field's own bends."""
+    lags: Annotated[int, Option(3, 1000, "lags", "half of the last one more each")] = 8
+    """Numbers of frames over which noise is compared to see how long it lasts."""
+    memories: Annotated[int, Option(10, 10_000, "values", "steps of 5 %, refined")] = 19
+    """Correlations from frame to frame that are tried between 0 and 1."""
+    least_memory: Annotated[float, Option(0.0, 1.0, "-", "shorter noise is seen as well in three frames")] = 0.3
+    """Correlation of noise from frame to frame above which it counts as lasting."""
+    longest_memory: Annotated[float, Option(0.1, 100.0, "-", "of noise that lasts longer too few values are seen")] = (
+        4.0
+    )
+    """Longest time constant of noise, over the time within which it is looked at."""
     step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3
     """Different places from which they may be multiples of a step."""
 

@@ -40,9 +40,10 @@ class Patch:
     ``pose`` [k, 3]: where it lies among the markers at rest, x m, y m and yaw rad of its longer axis; ``speed`` m/s:
     mean speed of the object over the markers; ``regime``: one of ``REGIMES``; ``normal_force`` N,
     ``tangential_force`` [k, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
-    bears these, and the standard deviation ``ratio_noise`` that noise of the forces gives it; ``element_force`` N: mean
-    normal force of its elements, weighted by force. Without forces all of these are NaN, and ratio and noise where what
-    presses is not beyond noise.
+    bears these, the standard deviation ``ratio_noise`` that noise of the forces gives it, and ``noise_frames``, in how
+    many frames in a row that noise is no less sure than in one (1: white); ``element_force`` N: mean normal force of
+    its elements, weighted by force. Without forces all of these are NaN (``noise_frames`` 1), and ratio and noise where
+    what presses is not beyond noise.
     """
 
     first: int
@@ -55,6 +56,7 @@ class Patch:
     load_ratio: FloatArray
     element_force: FloatArray
     ratio_noise: FloatArray
+    noise_frames: FloatArray
     plateau: NDArray[np.bool_]
 
     @property

@@ -84,9 +84,6 @@ class EstimateDefaults(Options):
     noise_memories: Annotated[int, Option(10, 10_000, "values", "steps of 5 %, refined")] = 19
     """Correlations from frame to frame that are tried between 0 and 1."""
 
-    least_memory: Annotated[float, Option(0.0, 1.0, "-", "shorter noise is seen as well in three frames")] = 0.3
-    """Correlation of marker noise from frame to frame above which a detector is given its size."""
-
     wide_kernel: Annotated[float, Option(0.0, 100.0, "elements", "turns a pivot's friction by 2 %")] = 0.5
     """Least width of a kernel that a detection is given."""
 

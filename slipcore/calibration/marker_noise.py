@@ -5,17 +5,15 @@ D(k) = 2 σ_w² + 2 σ_c² (1 − φᵏ) for white noise beside a first-order au
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar, nnls
 from scipy.stats import norm
 
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate, unknown
 from slipcore.calibration.press import PressLog
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.noise_memory import fit_memory
 
 
 def marker_noise(presses: list[PressLog]) -> tuple[Estimate, Estimate]:
@@ -83,22 +81,5 @@ def _change(plane: FloatArray, free: BoolArray, lag: int) -> tuple[FloatArray, i
 def _fit(variogram: FloatArray) -> tuple[float, float]:
     """Standard deviation, and correlation from frame to frame, of the process that fits best to D(1 …) [lags]."""
     lag = np.arange(1, len(variogram) + 1)
-
-    def misfit(memory: float) -> float:
-        return _parts(variogram, 1.0 - memory**lag)[2]
-
-    tried = np.linspace(0.0, 1.0, ESTIMATE.noise_memories + 2)[:-1]
-    near = int(np.argmin([misfit(memory) for memory in tried]))
-    low, high = tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)]
-    memory = float(minimize_scalar(misfit, bounds=(low, high), method="bounded").x)
-    white, correlated, _ = _parts(variogram, 1.0 - memory**lag)
-    variance = white + correlated
-    return math.sqrt(variance), memory * correlated / variance if variance > 0.0 else 0.0
-
-
-def _parts(variogram: FloatArray, rise: NDArray[np.floating[Any]]) -> tuple[float, float, float]:
-    """White and correlated variance, neither below 0, that fit best, and the sum of relative squares."""
-    weight = 1.0 / np.maximum(variogram, np.finfo(float).tiny)
-    terms = 2.0 * np.stack([np.ones_like(rise), rise], axis=1) * weight[:, None]
-    found, misfit = nnls(terms, variogram * weight)
-    return float(found[0]), float(found[1]), float(misfit)
+    found = fit_memory(0.5 * variogram, lambda memory: np.stack([np.ones(len(lag)), 1.0 - memory**lag], axis=1))
+    return found.deviation, found.correlation

@@ -10,7 +10,7 @@ import numpy as np
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate
 from slipcore.calibration.zero import elapsed
-from slipcore.defaults import DEFAULT_METHOD
+from slipcore.defaults import DEFAULT_METHOD, NOISE
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 from slipcore.surface.log_normals import normals_of
@@ -82,7 +82,7 @@ class SensorModel:
     def _noise_options(self) -> dict[str, float]:
         """How noisy markers are, where a detector's own estimate from three frames would be too low."""
         noise, memory = self["marker_noise"], self["marker_noise_correlation"]
-        lasting = memory.is_identified and memory.value >= ESTIMATE.least_memory
+        lasting = memory.is_identified and memory.value >= NOISE.least_memory
         return {"displacement_floor": noise.value} if lasting and noise.is_significant else {}
 
     def _kernel_options(self) -> dict[str, float]:

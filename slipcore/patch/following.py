@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.defaults import PatchOptions, choose_options
+from slipcore.defaults import SMOOTHING, PatchOptions, choose_options
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.noise import estimate_noise
+from slipcore.noise_memory import WHITE, Lasting, lasting_noise_of
 from slipcore.patch.motion import motion_over_markers
 from slipcore.patch.plateau import find_plateaus
 from slipcore.patch.pose import lattice_pose
@@ -39,30 +40,39 @@ def _follow(
     """Of all patches together: a long log of short touches has more of them than Python could look at one by one."""
     pose, gyration = lattice_pose(spans, pressing, log.position, options.least_anisotropy)
     motion = motion_over_markers(log, spans, pressing, pose, gyration, options)
-    resultant = _resultants(log, spans, options)
+    lasting = _lasting(log, options)
+    resultant = _resultants(log, spans, options, lasting)
     largest = np.maximum.reduceat(resultant.normal_force, spans.bounds[:-1])
     held = resultant.normal_force >= np.repeat(options.least_force_share * largest, np.diff(spans.bounds))
     load = resultant.load_ratio, resultant.tangential_force, held
     pitch = math.sqrt(log.element_area)
     plateaus = find_plateaus(log.time[spans.frame], spans.bounds, motion, *load, pitch, options)
+    noise_frames = np.full(len(spans.frame), lasting.frames)
     regime = regimes(spans, slip, motion, plateaus, options)
-    fields: tuple[NDArray[Any], ...] = (pose, motion.speed, regime, *resultant, plateaus.any)
+    fields: tuple[NDArray[Any], ...] = (pose, motion.speed, regime, *resultant, noise_frames, plateaus.any)
     limits = pairwise(spans.bounds.tolist())
     return tuple(Patch(int(spans.frame[begin]), *(field[begin:end] for field in fields)) for begin, end in limits)
 
 
-def _resultants(log: GraspLog, spans: Spans, options: PatchOptions) -> Resultants:
+def _resultants(log: GraspLog, spans: Spans, options: PatchOptions, lasting: Lasting) -> Resultants:
     """NaN without forces."""
     if log.force is None:
         frames = len(spans.frame)
         return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(4)))
     wide = spans._replace(labels=widened(spans.labels, options.margin))
     fields = log.force, normals_of(log), log.position + log.displacement
-    noise = np.maximum(_force_noise(log.time, log.force), noise_of_sums(log.time, *fields, wide))
+    of_elements = lasting.gain * np.nan_to_num(estimate_noise(log.time, _series(log.force)))
+    noise = np.maximum(of_elements, noise_of_sums(log.time, *fields, wide))
     return resultants(*fields, wide, options.kernel_width, noise)
 
 
-def _force_noise(time: FloatArray, force: FloatArray) -> float:
-    """Standard deviation of a component of the force [t, n, m, 3] N on an element; 0 where too few show it."""
-    noise = estimate_noise(time, np.moveaxis(force, -1, 1).reshape(len(time), 3, -1))
-    return float(np.nan_to_num(noise))
+def _lasting(log: GraspLog, options: PatchOptions) -> Lasting:
+    """How noise of forces lasts within the time over which the load on a patch is averaged."""
+    if log.force is None:
+        return WHITE
+    return lasting_noise_of(log.time, _series(log.force), options.window, SMOOTHING.least_force_noise)
+
+
+def _series(force: FloatArray) -> FloatArray:
+    """Components of the forces [t, n, m, 3] on elements: [t, 3, n m]."""
+    return np.moveaxis(force, -1, 1).reshape(len(force), 3, -1)

@@ -57,7 +57,8 @@ def _largest(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) 
     )
     windows = max(float(np.sum(1.0 / np.fmax(count, 1.0), where=held)), 1.0)
     deviations = -NormalDist().inv_cdf(NormalDist().cdf(-NORMAL_95) / windows)
-    low = mean - raised - deviations * np.sqrt(np.fmax(variance, 0.0) / np.fmax(count, 1.0))
+    independent = np.fmax(count / joined(patches, "noise_frames"), 1.0)
+    low = mean - raised - deviations * np.sqrt(np.fmax(variance, 0.0) / independent)
     if not np.isfinite(low).any():
         return 0.0, 0.0
     best = int(np.nanargmax(low))

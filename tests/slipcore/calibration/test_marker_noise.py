@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.calibration.marker_noise import _bounded, _change, _fit, _mean_squares, _parts, marker_noise
+from slipcore.calibration.marker_noise import _bounded, _change, _fit, _mean_squares, marker_noise
 from slipcore.calibration.press import PressLog, find_press
 from slipcore.frames import FloatArray
 from tests.slipcore.calibration.straight_press import LOAD, shares, straight
@@ -30,11 +30,7 @@ def test_an_exact_variogram_gives_its_process(white: float, lasting: float, memo
     assert correlation == pytest.approx(memory * lasting**2 / variance, abs=2e-3)
 
 
-def test_parts_of_a_variogram_are_not_negative() -> None:
-    rise = 1.0 - 0.5**LAGS
-    assert _parts(2.0 * 3.0 + 2.0 * 4.0 * rise, rise) == pytest.approx((3.0, 4.0, 0.0), abs=1e-9)
-    white, lasting, misfit = _parts(8.0 - 2.0 * rise, rise)
-    assert (lasting, white > 3.0, misfit > 0.0) == (0.0, True, True)
+def test_no_noise_remembers_nothing() -> None:
     assert _fit(np.zeros(5)) == (0.0, 0.0)
 
 

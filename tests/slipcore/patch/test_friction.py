@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
 
 from benchmarks.calibration.patch_grasps import PITCH, PIVOT, SLIDE, Setting, grasp, ramp_and_go
+from benchmarks.detector.bounds import held_by, lasting, smoothed
 from slipcore import GraspLog, InvalidInput, detect_slip
 from slipcore.detection.batch import with_patches
 from slipcore.patch.following import follow_patches
@@ -62,20 +62,6 @@ ONE_ELEMENT = np.zeros((5, 5), bool)
 ONE_ELEMENT[2, 2] = True
 
 
-def held_by(elements: np.ndarray, share: float, noise: np.ndarray) -> ContactFriction:
-    """A load of ``share`` of 0.8 N held by these elements [n, m] of 3 mm, under noise [t, n, m, 3] N of all forces."""
-    time = np.arange(len(noise)) / 30.0
-    axes = (3e-3 * (np.arange(length) - 0.5 * (length - 1)) for length in elements.shape)
-    position = np.stack([*np.meshgrid(*axes, indexing="ij"), np.zeros(elements.shape)], axis=-1)
-    force = noise.copy()
-    force[:, elements] += 0.8 / elements.sum() * np.array([share, 0.0, -1.0])
-    log = GraspLog(time, position, np.zeros_like(force), 9e-6, force, np.broadcast_to([0.0, 0.0, 1.0], force.shape))
-    touching = np.broadcast_to(elements, force.shape[:3])
-    found = contact_friction(time, follow_patches(log, touching, np.zeros_like(touching)))
-    assert found is not None
-    return found
-
-
 def white(elements: np.ndarray, noise: float, seed: int, seconds: float = 2.0) -> np.ndarray:
     """Noise N of forces on these elements [n, m] at 30 Hz: [t, n, m, 3]."""
     return noise * np.random.default_rng(seed).standard_normal((round(30 * seconds), *elements.shape, 3))
@@ -111,10 +97,20 @@ def test_noise_that_elements_share_is_known_from_the_sums_of_their_forces(shape:
 
 def test_noise_that_is_smoothed_over_elements_is_known_from_the_sums_of_their_forces() -> None:
     elements = np.ones((5, 5), bool)
-    smooth = [gaussian_filter(white(elements, 5e-3, seed), (0.0, 1.2, 1.2, 0.0)) for seed in range(100)]
+    smooth = [5e-3 * smoothed((60, 5, 5, 3), np.random.default_rng(seed)) for seed in range(100)]
     lows = [held_by(elements, 0.35, noise).low / (1.0 - 1.96 * 0.03) for noise in smooth]
     assert sum(low > 0.35 for low in lows) <= 5
     assert np.median(lows) > 0.25
+
+
+@pytest.mark.parametrize("side", [3, 5, 10])
+def test_noise_that_lasts_over_frames_is_known_from_more_than_three_of_them(side: int) -> None:
+    """As white noise that a filter with a time constant of ten frames leaves of: in 24 to 28 of 40 too large before."""
+    elements, seeds = np.ones((side, side), bool), range(100)
+    noise = (5e-3 * lasting((60, side, side, 3), np.random.default_rng(seed)) for seed in seeds)
+    lows = [held_by(elements, 0.35, each).low / (1.0 - 1.96 * 0.03) for each in noise]
+    assert sum(low > 0.35 for low in lows) <= 5
+    assert np.median(lows) > 0.1
 
 
 def test_a_contact_that_travels_under_hardly_any_load_rolls() -> None:

@@ -1,0 +1,113 @@
+"""Noise that lasts from frame to frame: how much of it there is, and for how long.
+
+White noise beside a first-order autoregressive process, whose correlation over k frames is φᵏ.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar, nnls
+
+from slipcore.defaults import NOISE
+from slipcore.frames import FloatArray
+from slipcore.noise import noise_of_three
+
+
+class NoiseMemory(NamedTuple):
+    """Variances of what is ``white`` and what is ``correlated``, the latter by φ = ``memory`` from frame to frame."""
+
+    white: float
+    correlated: float
+    memory: float
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of a value."""
+        return math.sqrt(self.white + self.correlated)
+
+    @property
+    def correlation(self) -> float:
+        """Of values in successive frames."""
+        variance = self.white + self.correlated
+        return self.memory * self.correlated / variance if variance > 0.0 else 0.0
+
+    @property
+    def frames(self) -> float:
+        """Integrated autocorrelation time: so many frames in a row say no more than one."""
+        return 1.0 + 2.0 * self.correlation / (1.0 - self.memory)
+
+
+class Lasting(NamedTuple):
+    """Standard deviation of noise over what three frames in a row show of it, and ``NoiseMemory.frames``."""
+
+    gain: float
+    frames: float
+
+
+WHITE = Lasting(1.0, 1.0)
+
+
+def fit_memory(squares: FloatArray, terms: Callable[[float], FloatArray], longest: float = 1.0) -> NoiseMemory:
+    """The noise of which mean squares [k] are made, by least relative errors, with φ below ``longest``.
+
+    ``terms``(φ) [k, 2 or more]: what a variance of 1 of white noise, of correlated noise, and of anything else, adds.
+    """
+
+    def misfit(memory: float) -> float:
+        return _variances(squares, terms(memory))[1]
+
+    tried = np.linspace(0.0, longest, NOISE.memories + 2)[:-1]
+    near = int(np.argmin([misfit(memory) for memory in tried]))
+    low, high = tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)]
+    memory = float(minimize_scalar(misfit, bounds=(low, high), method="bounded").x)
+    (white, correlated, *_), _ = _variances(squares, terms(memory))
+    return NoiseMemory(float(white), float(correlated), memory)
+
+
+def _variances(squares: FloatArray, terms: FloatArray) -> tuple[FloatArray, float]:
+    """Variances, none below 0, that fit best, and the root of their relative squares."""
+    weight = 1.0 / np.maximum(squares, np.finfo(float).tiny)
+    found, misfit = nnls(terms * weight[:, None], squares * weight)
+    return found, float(misfit)
+
+
+def lasting_noise_of(time: FloatArray, series: FloatArray, window: float, least: float) -> Lasting:
+    """How noise of recorded series [t, axes, k] lasts, within ``window`` s.
+
+    Values are compared with the line through those some frames before and after, as ``noise.noise_of_three`` does, for
+    more and more frames: white noise parts from it by as much each time, a load that changes smoothly by the square of
+    the time. What the series have in common drops out, and what a few of them do, or all for a short time.
+
+    ``WHITE`` where noise is less than ``least``, where too few series or frames show it, and where over two frames it
+    is hardly more than over one: with a correlation below ``NOISE.least_memory`` three frames show it as well.
+    """
+    most = min(round(window / float(np.median(np.diff(time)))) if len(time) > 1 else 0, len(time) // NOISE.least_series)
+    lags = np.unique(np.round(np.geomspace(1.0, max(most, 1), NOISE.lags)).astype(int))
+
+    def terms(memory: float) -> FloatArray:
+        correlated = 1.0 - (4.0 * memory**lags - memory ** (2 * lags)) / 3.0
+        return np.stack([np.ones(len(lags)), correlated, (lags / lags[-1]) ** 4], axis=1)
+
+    if len(lags) <= terms(0.0).shape[1]:
+        return WHITE
+    chosen = np.ascontiguousarray(series[..., np.unique(np.linspace(0, series.shape[2] - 1, NOISE.series).astype(int))])
+    squares, shortest = np.array([_noise_at(time, chosen, lag) for lag in lags]) ** 2, terms(NOISE.least_memory)[:, 1]
+    if not squares.min() > 0.0 or squares[0] < least**2 or squares[1] * shortest[0] < squares[0] * shortest[1]:
+        return WHITE
+    found = fit_memory(squares, terms, longest=math.exp(-1.0 / (NOISE.longest_memory * float(lags[-1]))))
+    return Lasting(found.deviation / math.sqrt(float(squares[0])), found.frames)
+
+
+def _noise_at(time: FloatArray, series: FloatArray, lag: int) -> float:
+    """Median of what evenly chosen frames show against those ``lag`` before and after; 0 where none does."""
+    room = np.empty(series.shape[1:])
+    frames = np.unique(np.linspace(lag, len(time) - lag - 1, NOISE.memory).astype(int))
+    shares = (time[frames] - time[frames - lag]) / (time[frames + lag] - time[frames - lag])
+    found = [
+        noise_of_three(series[k - lag], series[k], series[k + lag], share, room)
+        for k, share in zip(frames, shares, strict=True)
+    ]
+    known = [each for each in found if not math.isnan(each)]
+    return float(np.median(known)) if known else 0.0
