@@ -26,21 +26,22 @@ def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
     ``position`` [j, 2] m: markers at rest, at the gel's ``marker_depth``. Directions are x, y and *into* the gel, of
     displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled.
     """
-    return response_matrices(gel, [nodes], position)[0]
+    return response_matrices(gel, nodes.grid.pitch[0], [nodes.places()], position)[0]
 
 
 def response_matrices(
-    gel: Gel, lattices: Sequence[Nodes], position: FloatArray, axes: Sequence[int] = (0, 1, 2)
+    gel: Gel, pitch: float, nodes: Sequence[FloatArray], position: FloatArray, axes: Sequence[int] = (0, 1, 2)
 ) -> list[FloatArray]:
-    """``response_matrix`` of several lattices of nodes of one pitch, of displacement along some ``axes`` alone."""
-    pitch, cells, finer = lattices[0].grid.pitch[0], RESPONSE.cells, RESPONSE.finer
-    shapes = [(len(position), len(nodes)) for nodes in lattices]
-    offsets, places = zip(*(_offsets(position, nodes.places(), pitch / cells) for nodes in lattices), strict=True)
+    """``response_matrix`` of several sets of ``nodes`` [k, 2] m, whose hat functions have the half-width ``pitch`` m,
+    and of displacement along some ``axes`` alone.
+    """
+    cells, finer = RESPONSE.cells, RESPONSE.finer
+    offsets, places = zip(*(_offsets(position, each, pitch / cells) for each in nodes), strict=True)
     reach = int(np.ceil(max(np.abs(offset).max() for offset in offsets))) + 3  # a cubic spline ends three cells beyond
     close = RESPONSE.near * cells
     far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
     middle = (slice(reach - close, reach + close + 1),) * 2
-    matrices = [np.empty((len(axes), markers, 3, count)) for markers, count in shapes]
+    matrices = [np.empty((len(axes), len(position), 3, len(each))) for each in nodes]
     for component, table in far.items():
         directions = [(axes.index(to), by) for to, by in _directions(component) if to in axes]
         if not directions:

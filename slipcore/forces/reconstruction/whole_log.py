@@ -10,8 +10,10 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.strength import Criterion
+from slipcore.forces.inverse.whole_lattice import WholeLattice
 from slipcore.forces.operator.gel import Gel
-from slipcore.forces.recording import DisplacementData, error
+from slipcore.forces.reconstruction.height import at_points
+from slipcore.forces.recording import DisplacementData, error, rows
 from slipcore.forces.tracking.frame_forces import FrameForces, Reader, typical_deviation
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.sensor import SensorResponse
@@ -106,7 +108,8 @@ def reconstruct(
     without it the log's own ``gripper_force`` is taken where it is above 0. ``noise`` m of a marker's coordinate (None:
     estimated from the log); ``criterion`` that chooses the strength of the prior. Markers whose z never changes count
     as seen in the plane only, and displacements at the end of the sensor's range as not seen along that axis.
-    Of a log that saw displacement along the normal alone, forces along the surface are 0 with an infinite deviation.
+    Of a log that saw displacement along the normal alone, forces along the surface are 0 with an infinite deviation; it
+    is taken for the height of places, as maps show it, not of points of the gel.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
     shown = DisplacementData.of(log, noise)
@@ -117,14 +120,33 @@ def reconstruct(
         total_force_deviation = log.gripper_force_deviation
     known = KnownForce.of(total_force, total_force_deviation, len(log))
     known.check(name, gel, log.element_area * math.prod(log.grid))
+    result, lattice = _followed(log, sensor, shown, known, criterion)
+    if sensor.sees_along_surface:
+        return result
+    of_points, _ = rows(at_points(log, gel, result.force), shown.saturated, shown.axes)
+    result, _ = _followed(log, sensor, replace(shown, data=of_points), known, criterion, lattice)
+    return _normal_alone(result)
+
+
+def _followed(
+    log: GraspLog,
+    sensor: SensorResponse,
+    shown: DisplacementData,
+    known: KnownForce,
+    criterion: Criterion,
+    lattice: WholeLattice | None = None,
+) -> tuple[Reconstruction, WholeLattice | None]:
+    """Forces in all frames, from that in which markers moved most both ways, and the ``lattice`` by which pressed nodes
+    were found where depth is seen, made unless there is one.
+    """
     recording = _Recording(sensor, shown, known)
     touched, strongest = shown.touched(), shown.strongest()
     result = _no_forces(log, shown, known.given, sensor)
     for t in map(int, np.flatnonzero(~touched)):
         _write_frame(result, t, FrameForces.unnoticed(log.grid, result.unnoticed, known[t]))
     if not touched.any():
-        return _as_seen(result, sensor)
-    tracker = Tracker.of(sensor, *recording.frame(strongest), criterion)
+        return result, lattice
+    tracker = Tracker.of(sensor, *recording.frame(strongest), criterion, lattice)
     result = replace(
         result,
         information=tracker.key.fit.information(),
@@ -140,7 +162,7 @@ def reconstruct(
                 reader = reader if reader.key is now.key else Reader.of(sensor, now.key)
                 _write_frame(result, t, reader.read(data, log.grid))
     away = known.away(result.resultant, result.resultant_deviation)
-    return _as_seen(replace(result, contradiction=np.where(touched[:, None], away, np.nan)), sensor)
+    return replace(result, contradiction=np.where(touched[:, None], away, np.nan)), tracker.lattice
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,10 +201,8 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, sensor:
     )
 
 
-def _as_seen(result: Reconstruction, sensor: SensorResponse) -> Reconstruction:
-    """The same, but that by depth alone no force along the surface is known."""
-    if sensor.sees_along_surface:
-        return result
+def _normal_alone(result: Reconstruction) -> Reconstruction:
+    """The same, but that no force along the surface is known."""
     unknown = np.array([np.inf, np.inf, 0.0])
     normal = np.array([0.0, 0.0, 1.0])
     return replace(

@@ -43,7 +43,8 @@ class SensorResponse:
         nodes, young = Nodes.around(place, element_area), gel.young_modulus
         load, between = young * nodes.area, nodes.between
         at_nodes, midway = (
-            _observed(young * response, load) for response in response_matrices(gel, (nodes, between), place, axes)
+            _observed(young * response, load)
+            for response in response_matrices(gel, nodes.grid.pitch[0], (nodes.places(), between.places()), place, axes)
         )
         elements = young * nodes.over_elements(place)
         under = at_nodes[:-3, :, elements.any(axis=0)]

@@ -123,5 +123,5 @@ def test_offsets_that_are_alike_are_evaluated_once_and_alike(monkeypatch: pytest
     assert set(evaluated) == {(6 + 14 - 1) * (5 + 13 - 1)}  # four rows of nodes beyond the markers on each side
     for k in (0, 17):
         np.testing.assert_allclose(response_matrix(gel, nodes, lattice[[k]])[:, 0], whole[:, k], rtol=1e-6, atol=1e-14)
-    (along_normal,) = response_matrices(gel, [nodes], lattice, axes=(2,))
+    (along_normal,) = response_matrices(gel, 1e-3, [nodes.places()], lattice, axes=(2,))
     np.testing.assert_array_equal(along_normal, whole[2:])

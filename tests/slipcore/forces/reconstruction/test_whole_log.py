@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import RBFInterpolator
 
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, Reconstruction, reconstruct
 from slipcore.forces.inverse.support import better_support
+from slipcore.forces.reconstruction import whole_log
+from slipcore.forces.reconstruction.height import at_points
 from slipcore.forces.recording import DisplacementData, least_power
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BY_FORCES, BY_MOTION
@@ -308,21 +311,53 @@ def test_what_does_not_fit_is_refused_by_name(pressed: Pressed) -> None:
 DEPTH_ALONE = {"displacement": "along the normal"}
 
 
+def heights(log: GraspLog, noise: float = 0.0) -> GraspLog:
+    """What maps of height show: how high the point stands that has come to each place, and nothing along the surface.
+
+    By a spline through the points where they have come to, through no more than thirty around.
+    """
+    seen = np.zeros_like(log.displacement)
+    for shown, moved in zip(seen, log.displacement, strict=True):
+        at, place = (log.position + moved)[..., :2].reshape(-1, 2), log.position[..., :2].reshape(-1, 2)
+        shown[..., 2] = RBFInterpolator(at, moved[..., 2].ravel(), neighbors=30)(place).reshape(log.grid)
+    seen[..., 2] += noise * np.random.default_rng(4).standard_normal(seen.shape[:3])
+    return replace(log, displacement=seen, metadata=DEPTH_ALONE)
+
+
 @pytest.mark.parametrize("noise", [1e-6, 1e-5])
 def test_depth_alone_tells_the_normal_force_and_nothing_of_the_tangential(pressed: Pressed, noise: float) -> None:
     """Shear had stood for pressure: on thin gels all of the normal force was lost."""
-    log = pressed(LATE, noise=noise)
-    seen = replace(log, displacement=log.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
-    found = reconstruct(seen, GEL, noise=noise)
+    log = pressed(LATE)
+    found = reconstruct(heights(log, noise), GEL, noise=noise)
     total = truth(log)[..., 2].sum(axis=(1, 2))
     error = found.resultant[:, 2] - total
-    np.testing.assert_array_less(np.abs(error), 0.02 * np.abs(total))
+    np.testing.assert_array_less(np.abs(error), 0.03 * np.abs(total))
     np.testing.assert_array_less(np.abs(error), 2.0 * found.resultant_deviation[:, 2])
-    assert relative(found.force[..., 2], truth(log)[..., 2]) < 0.1
+    assert relative(found.force[..., 2], truth(log)[..., 2]) < 0.12  # shear moves points up slopes
     for deviation in (found.deviation, found.resultant_deviation):
         np.testing.assert_array_equal(deviation[..., :2], np.inf)
     np.testing.assert_array_equal(found.information[:2], 0.0)
     assert found.information[2] > 0.99
+
+
+def test_heights_of_places_are_not_taken_for_those_of_points(pressed: Pressed, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a sphere presses the gel swells aside, up its slope: the normal force came out 1.9 % larger by them.
+
+    Nor does an element that is not seen let its neighbours take it for a hole.
+    """
+    points = pressed([2, 2])
+    log = heights(points)
+    observed = np.ones(log.displacement.shape[:3], dtype=bool)
+    observed[:, 9, 12] = False
+    holed = replace(log, displacement=log.displacement * observed[..., None], observed=observed)
+    with monkeypatch.context() as taken:
+        taken.setattr(whole_log, "at_points", lambda log, *_: log.displacement)
+        of_points = replace(points, displacement=points.displacement * [0.0, 0.0, 1.0], metadata=DEPTH_ALONE)
+        expected = reconstruct(of_points, GEL, noise=1e-6).resultant[:, 2]
+    for each in (log, holed):
+        np.testing.assert_allclose(reconstruct(each, GEL, noise=1e-6).resultant[:, 2], expected, rtol=0.01)
+    again = at_points(log, GEL, np.zeros_like(log.displacement))
+    np.testing.assert_array_equal(again, log.displacement)  # what nothing presses has come from nowhere else
 
 
 def test_where_nothing_touches_depth_alone_tells_no_tangential_force(pressed: Pressed) -> None:
