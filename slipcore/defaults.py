@@ -723,6 +723,12 @@ class CheckOptions(Options):
     """Frames at rest from which the forces in them count as the sensor's zero."""
     zero_share: Annotated[float, Option(0.0, 10.0, "-", "friction of 0.4 is off by 6 % then; scenes to 0.01")] = 0.025
     """Largest mean of what elements read at rest, as a share of their normal force in the grasp."""
+    zero_errors: Annotated[float, Option(1.0, 100.0, "-", "by chance in 0.3 % of components")] = 3.0
+    """Standard errors of a component's mean from which on it counts."""
+    leak_variances: Annotated[
+        float, Option(1.0, 1e3, "-", "the squared mean of what falls off linearly to nothing")
+    ] = 3.0
+    """Variances between elements beside the contact from which on a component's squared mean is no leak of it."""
     passing_touch: Annotated[float, Option(0.0, 1.0, "-", "noise above a threshold, and no contact")] = 0.05
     """Share of the frames in which an element may seem to touch, and count as not touched in the grasp."""
     free_distance: Annotated[int, Option(0, 1000, "elements", "smoothed forces spread over one to three")] = 2

@@ -5,6 +5,7 @@ it is measured, and alike: neither force, place nor scatter shows it. The marker
 """
 
 from collections.abc import Iterator
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
     if _likeness(-read[..., 2], held) > seen.limits.contact_likeness:  # markers were zeroed during a touch
         return
     touched = touched_elements(seen)
-    off, pressed = _alike(read[touched], force[rest][:, touched]), float(held[touched].mean())
+    off, pressed = _alike(read[touched], force[rest][:, touched], seen.limits), float(held[touched].mean())
     if 0.0 < seen.limits.zero_share * pressed < off:
         share = f"{off / pressed:.0%} of their force in the grasp"
         evidence = f"elements read {1e3 * off:.2g} mN in the mean while nothing moves them, {share}"
@@ -45,7 +46,7 @@ def zero_drift(seen: Subject) -> Iterator[Finding]:
         if min(np.count_nonzero(early), np.count_nonzero(late)) < seen.limits.least_rest or not elements.any():
             continue
         moved = np.median(force[late], axis=0) - np.median(force[early], axis=0)
-        off = _alike(moved[elements], force[late][:, elements], may_leak=elements is not touched)
+        off = _alike(moved[elements], force[late][:, elements], seen.limits, may_leak=elements is not touched)
         if 0.0 < seen.limits.zero_share * pressed < off:
             share = f"{off / pressed:.0%} of the force of elements in the grasp"
             evidence = f"elements {where} read {1e3 * off:.2g} mN more at its end than at its begin, {share}"
@@ -184,18 +185,24 @@ def _is_flat_below(normal: FloatArray, place: FloatArray, limits: CheckOptions) 
     return bool(turns and size[2] * root < limits.flat_places * spread * float(np.hypot(*size[:2])))
 
 
-def _alike(read: FloatArray, readings: FloatArray, may_leak: bool = False) -> float:
+def _alike(read: FloatArray, readings: FloatArray, limits: CheckOptions, may_leak: bool = False) -> float:
     """What elements read alike, N, beyond noise: of medians [k, 3] of ``readings`` [t, k, 3].
 
     What differs from element to element, as noise that outlasts the rest does, moves friction nowhere in the mean. What
     ``may_leak`` to them of a contact that changes falls off with their distance: it differs by as much as its mean.
+    Each component is compared with its own noise, by Student's distribution where that is known from few elements, so
+    that none hides what another shows.
     """
-    lasting = read.var(axis=0, ddof=min(len(read) - 1, 1))
+    from scipy.special import stdtrit
+
+    count, square = len(read), read.mean(axis=0) ** 2
+    lasting = read.var(axis=0, ddof=min(count - 1, 1))
     passing = 0.5 * np.pi * readings.var(axis=0, ddof=1).mean(axis=0) / len(readings)  # of medians
-    noise = np.maximum(lasting, passing) / len(read)
-    if may_leak:
-        noise = noise + np.maximum(lasting - 2.0 * passing, 0.0)  # of two medians that are compared
-    return float(np.sqrt(max((read.mean(axis=0) ** 2 - noise).sum(), 0.0)))
+    leak = float(may_leak) * np.maximum(lasting - 2.0 * passing, 0.0)  # of two medians that are compared
+    errors = float(stdtrit(max(count - 1, 1), NormalDist().cdf(limits.zero_errors)))
+    least = np.maximum(errors**2 * lasting, limits.zero_errors**2 * passing) / count + limits.leak_variances * leak
+    noise = np.maximum(lasting, passing) / count + leak
+    return float(np.sqrt(np.where(square > least, square - noise, 0.0).sum()))
 
 
 def _likeness(read: FloatArray, held: FloatArray) -> float:

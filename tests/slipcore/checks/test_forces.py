@@ -77,6 +77,22 @@ def test_a_zero_drifts_by_elements_beside_the_contact_from_its_first_to_its_last
     assert bool(found) == is_found
 
 
+def test_scatter_along_one_axis_hides_no_drift_along_another() -> None:
+    scatter = 0.05 * np.random.default_rng(3).standard_normal(GRID)
+    more = over_time(np.where(FRAMES < 20, 0.0, 5e-3), 0) + np.zeros((40, *GRID, 3))
+    more[20:, ..., 1] += scatter
+    found = told(forces.zero_drift(subject(plus(held(), more), CONTACT)))
+    assert found.startswith("elements beside the contact read 5 mN more")
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_scatter_between_elements_is_no_drift(seed: int) -> None:
+    more = np.where(FRAMES < 20, 0.0, 1.0)[:, None, None, None] * np.random.default_rng(seed).normal(
+        0.0, 0.01, (*GRID, 3)
+    )
+    assert not any(forces.zero_drift(subject(plus(held(), more), CONTACT)))
+
+
 @pytest.mark.parametrize(("distance", "free"), [(0, 60), (1, 48), (2, 28), (3, 0)])
 def test_elements_beside_the_contact_are_some_away_from_all_that_touch(distance: int, free: int) -> None:
     """Of 64 elements four touch, 16 are within one of them, 36 within two and all within three."""
@@ -278,10 +294,17 @@ def test_a_direction_is_a_vector_over_its_length_and_nothing_stays_nothing() -> 
 
 
 def test_what_elements_read_alike_is_freed_of_what_they_differ_by_and_of_noise() -> None:
-    """A mean of 3 along x and 4 along y, whose elements differ by 1 along x: of four, 1/4 is taken off of 25."""
-    read = np.array([[2.0, 4.0, 0.0], [4.0, 4.0, 0.0], [2.0, 4.0, 0.0], [4.0, 4.0, 0.0]])
+    """A mean of 3 along x and 4 along y, whose elements differ by 0.1 along x: of four, 1/4 of that is taken off."""
+    limits, read = CheckOptions(), np.array([[2.9, 4.0, 0.0], [3.1, 4.0, 0.0], [2.9, 4.0, 0.0], [3.1, 4.0, 0.0]])
     still = np.repeat(read[None], 5, axis=0)
-    assert forces._alike(read, still) == pytest.approx(np.sqrt(25.0 - (4.0 / 3.0) / 4.0), rel=1e-12)
+    assert forces._alike(read, still, limits) == pytest.approx(np.sqrt(25.0 - (0.04 / 3.0) / 4.0), rel=1e-12)
     noisy = still + 2.0 * np.array([1.0, -1.0, 1.0, -1.0, 0.0])[:, None, None] * [0.0, 1.0, 0.0]  # variance 4
     passing = 0.5 * np.pi * 4.0 / 5.0 / 4.0  # of medians of five frames, in the mean of four elements
-    assert forces._alike(read, noisy) == pytest.approx(np.sqrt(25.0 - 1.0 / 3.0 - passing), rel=1e-12)
+    assert forces._alike(read, noisy, limits) == pytest.approx(np.sqrt(25.0 - 0.01 / 3.0 - passing), rel=1e-12)
+
+
+@pytest.mark.parametrize(("spread", "found"), [(0.64, 1.0), (0.66, 0.0)])
+def test_a_mean_counts_from_as_many_errors_as_chance_hardly_makes_of_few_elements(spread: float, found: float) -> None:
+    """By Student's distribution three standard deviations are 9.2 standard errors of four elements."""
+    read = 3.0 + np.array([-spread, spread, -spread, spread])[:, None] * np.sqrt(0.75) * np.ones(3)
+    assert (forces._alike(read, np.repeat(read[None], 5, axis=0), CheckOptions()) > 0.0) == found
