@@ -17,6 +17,9 @@ from slipcore.frames import BoolArray, FloatArray
 LEAST_SEEN = 0.5
 """Share of an element's area whose height is known, at rest and in a frame, under which it is not observed there."""
 
+LARGEST_RISE = 0.1
+"""m, of a pixel; more is no height of a gel, and of what stands beside it in a sum too little is left."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Elements:
@@ -79,7 +82,8 @@ def frame_at_rest(rest: str | None, height: NDArray[np.floating], members: Membe
 def rise(height: NDArray[np.floating], frame: int, elements: Elements, pixel: float) -> tuple[FloatArray, BoolArray]:
     """Mean rise [t, e] m of elements since a ``frame`` of ``height`` [t, rows, columns] m, and which were seen [t, e].
 
-    A map at a time, by its sums over all that lies before each of their corners.
+    A map at a time, by its sums over all that lies before each of their corners. Raises ``InvalidInput`` for numbers
+    that are no height of a surface.
     """
     corners = elements.corners((height.shape[1], height.shape[2]), pixel)
     pixels = elements.area / pixel**2
@@ -87,6 +91,9 @@ def rise(height: NDArray[np.floating], frame: int, elements: Elements, pixel: fl
     for t, each in enumerate(height):
         risen = each.astype(np.float64) - height[frame]
         known = np.isfinite(risen)
+        if (largest := np.max(np.abs(risen), where=known, initial=0.0)) > LARGEST_RISE:
+            value = f"{largest:g} m (is it in m?) from that at rest in frame {t}"
+            raise InvalidInput("height", value, f"at most {LARGEST_RISE:g} m; NaN where nothing is seen")
         share[t] = _sum_within(corners, known.astype(np.float64)) / pixels
         mean[t] = _sum_within(corners, np.where(known, risen, 0.0)) / pixels
     seen = share >= LEAST_SEEN

@@ -65,8 +65,8 @@ def test_elements_between_pixels_weigh_them_by_area() -> None:
     """Of three pixels in two elements, the middle one counts half for each."""
     elements = Elements.dividing((1, 3), 1.0, (1, 2))
     np.testing.assert_allclose(elements.corners((1, 3), 1.0)[1], [[0.0, 1.5], [1.5, 3.0], [1.5, 3.0], [0.0, 1.5]])
-    risen, seen = rise(np.array([[[0.0, 0.0, 0.0]], [[3.0, 6.0, np.nan]]]), 0, elements, 1.0)
-    np.testing.assert_allclose(risen[1], [4.0, 0.0])
+    risen, seen = rise(np.array([[[0.0, 0.0, 0.0]], [[3e-3, 6e-3, np.nan]]]), 0, elements, 1.0)
+    np.testing.assert_allclose(risen[1], [4e-3, 0.0])
     np.testing.assert_array_equal(seen[1], [True, False])
 
 
@@ -88,6 +88,15 @@ def test_maps_take_no_more_memory_than_is_counted_with(tmp_path: Path, side: flo
 def test_a_pixel_in_another_unit_is_refused(tmp_path: Path, pixel: float) -> None:
     with pytest.raises(InvalidInput, match="is it in m"):
         formats.read(file_of(tmp_path, np.zeros((2, *PIXELS)), {"pixel": pixel}))
+
+
+@pytest.mark.parametrize("place", [(0, 0), (30, 40)], ids=["of no element", "of an element"])
+def test_a_number_that_stands_for_no_height_is_refused(tmp_path: Path, place: tuple[int, int]) -> None:
+    """In sums over the map nothing else was left beside it: all displacement was 0."""
+    height = FRAMES.astype("f4")
+    height[(1, *place)] = np.finfo("f4").max
+    with pytest.raises(InvalidInput, match=r"height is 3.4.*e\+38 m \(is it in m\?\) .* NaN where nothing is seen"):
+        formats.read(file_of(tmp_path, height, {**PLACES, "element_area": {"value": 1e-7}}, markers=markers()))
 
 
 def test_missing_pixels_do_not_let_a_curved_rest_show(tmp_path: Path) -> None:
