@@ -19,7 +19,7 @@ MOMENT = 1.0
 AGAIN = 0.05
 """Seconds after which an interrupt that came within the compiler is sent once more."""
 
-COMPILER = re.compile(r"[/\\\\](llvmlite|numba)[/\\\\]")
+COMPILER = re.compile(r"[/\\](llvmlite|numba)[/\\]")
 """Whose code an exception may not pass: it is called from C++, which loses it or ends the process."""
 
 Thing = TypeVar("Thing")
@@ -75,11 +75,10 @@ def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
     try:
-        with _noted_interrupts() as came:
+        with _noted_interrupts() as raise_lost:
 
             def tell(part: float, doing: str | None = None) -> None:
-                if came.is_set():
-                    raise KeyboardInterrupt
+                raise_lost()
                 line.tell(part, doing)
 
             yield tell
@@ -90,23 +89,36 @@ def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
 
 
 @contextmanager
-def _noted_interrupts() -> Iterator[threading.Event]:
-    """Set once Ctrl-C came, which is raised only once no kernel is being compiled or loaded."""
+def _noted_interrupts() -> Iterator[Callable[[], None]]:
+    """Ctrl-C is raised only once no kernel is being compiled or loaded; gives what raises one that came and was lost.
+
+    Once: what is sent once more would come upon whoever cleans up after the first.
+    """
     came, before = threading.Event(), signal.getsignal(signal.SIGINT)
+    again = threading.Timer(AGAIN, os.kill, (os.getpid(), signal.SIGINT))
 
     def note(number: int, frame: FrameType | None) -> None:
+        nonlocal again
         came.set()
+        again.cancel()
         if any(COMPILER.search(each.f_code.co_filename) for each, _ in walk_stack(frame)):
-            threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+            again = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
+            again.start()
         else:
             signal.default_int_handler(number, frame)
+
+    def raise_lost() -> None:
+        if came.is_set():
+            again.cancel()
+            raise KeyboardInterrupt
 
     if before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, note)
     try:
-        yield came
-    except Exception as error:
-        if came.is_set():
+        yield raise_lost
+    except (Exception, KeyboardInterrupt) as error:
+        again.cancel()
+        if came.is_set() and isinstance(error, Exception):
             raise KeyboardInterrupt from error
         raise
     finally:

@@ -136,6 +136,19 @@ def test_an_interrupt_within_the_compiler_is_raised_once_it_is_left(compiler: st
         time.sleep(30.0)
 
 
+@pytest.mark.usefixtures("heeds_interrupts")
+@pytest.mark.parametrize("ends", ["told", "failed"])
+def test_an_interrupt_within_the_compiler_comes_once(ends: str) -> None:
+    """The second came upon who took away what was half written."""
+    with pytest.raises(KeyboardInterrupt), shown_progress("thinking") as tell:  # noqa: PT012
+        for _ in range(2):
+            exec(compile("signal.raise_signal(signal.SIGINT)", "packages/numba/engine.py", "exec"), {"signal": signal})
+        if ends == "failed":
+            raise RuntimeError("no kernel")
+        tell(0.2)
+    time.sleep(3.0 * progress.AGAIN)
+
+
 HEED_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 """What a shell starts in the background ignores them, and so does all that is started by that: these tests, perhaps."""
 
