@@ -17,6 +17,9 @@ from slipcore.frames import BoolArray, FloatArray
 LEAST_SEEN = 0.5
 """Share of an element's area whose height is known, at rest and in a frame, under which it is not observed there."""
 
+ROUNDING = 1e-9
+"""Of a share: of markers on the edge of a map all are observed, or none."""
+
 LARGEST_RISE = 0.1
 """m, of a pixel; more is no height of a gel, and of what stands beside it in a sum too little is left."""
 
@@ -89,14 +92,15 @@ def rise(height: NDArray[np.floating], frame: int, elements: Elements, pixel: fl
     pixels = elements.area / pixel**2
     mean, share = np.empty((2, len(height), corners.shape[-1]))
     for t, each in enumerate(height):
-        risen = each.astype(np.float64) - height[frame]
+        with np.errstate(invalid="ignore"):  # infinite in both
+            risen = each.astype(np.float64) - height[frame]
         known = np.isfinite(risen)
         if (largest := np.max(np.abs(risen), where=known, initial=0.0)) > LARGEST_RISE:
             value = f"{largest:g} m (is it in m?) from that at rest in frame {t}"
             raise InvalidInput("height", value, f"at most {LARGEST_RISE:g} m; NaN where nothing is seen")
         share[t] = _sum_within(corners, known.astype(np.float64)) / pixels
         mean[t] = _sum_within(corners, np.where(known, risen, 0.0)) / pixels
-    seen = share >= LEAST_SEEN
+    seen = share >= LEAST_SEEN - ROUNDING
     return np.divide(mean, share, out=np.zeros_like(mean), where=seen), seen
 
 

@@ -99,6 +99,27 @@ def test_a_number_that_stands_for_no_height_is_refused(tmp_path: Path, place: tu
         formats.read(file_of(tmp_path, height, {**PLACES, "element_area": {"value": 1e-7}}, markers=markers()))
 
 
+@pytest.mark.parametrize("pixels", [20, 40, 67, 80])
+def test_markers_on_the_edge_of_a_map_are_observed_alike(pixels: int) -> None:
+    """Half of each square is seen, but for rounding by which some were not."""
+    middle, side = 2e-3 / pixels * (0.5 * pixels), 5e-4
+    at = np.linspace(-middle, middle, 5)
+    position = np.zeros((5, 5, 3))
+    position[..., 0], position[..., 1] = np.meshgrid(at, at)
+    for wide in (side, 0.6 * side, 0.998 * side):
+        _, seen = rise(np.zeros((1, pixels, pixels)), 0, Elements(position, (wide, wide)), 2e-3 / pixels)
+        corners = np.zeros((5, 5), dtype=bool)
+        corners[::4, ::4] = True
+        np.testing.assert_array_equal(seen.reshape(5, 5), ~corners)
+
+
+def test_what_is_infinite_in_all_frames_is_not_seen() -> None:
+    height = np.full((2, 4, 4), 1e-3)
+    height[:, 0, 0] = np.inf
+    _, seen = rise(height, 0, Elements.dividing((4, 4), 1e-4, (4, 4)), 1e-4)
+    assert seen.sum(axis=1).tolist() == [15, 15]
+
+
 def test_missing_pixels_do_not_let_a_curved_rest_show(tmp_path: Path) -> None:
     height = CURVED - np.array([0.0, 1e-4, 1e-4])[:, None, None]
     height[1, :, 3:7] = np.nan  # under half of the elements' first column
