@@ -257,11 +257,17 @@ class BoundedConnection(asyncio.Protocol):
                 self._is_beyond = not self._close_one(held)
                 return
         if self._most is not None and count > self._most and len(staying := self._staying()) > self._most:
-            addresses = Counter(map(_address, staying))
-            unneeded = [each for each in staying if each is not self and _is_unneeded(each)]
-            several = max(1, int(ROOM_SHARE * self._most))
-            for each in nsmallest(several, unneeded, key=lambda each: (-addresses[_address(each)], _need(each))):
+            for each in self._first_to_go(staying, max(1, int(ROOM_SHARE * self._most))):
                 _let_go(each)
+
+    def _first_to_go(self, staying: list[Any], several: int) -> list[Any]:
+        """So many of those that have nothing to do, each of the address that has most once the others are gone."""
+        addresses, left = Counter(map(_address, staying)), []
+        unneeded = sorted((each for each in staying if each is not self and _is_unneeded(each)), key=_need)
+        for each in unneeded:
+            left.append(addresses[_address(each)])
+            addresses[_address(each)] -= 1
+        return [unneeded[k] for k in nsmallest(several, range(len(left)), key=lambda k: -left[k])]
 
     def _close_one(self, held: list[Any]) -> bool:
         """Close one that is closing with what its client does not read, or the longest idle; whether there is one."""

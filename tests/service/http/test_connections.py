@@ -302,6 +302,30 @@ def test_a_websocket_that_closes_and_is_not_read_makes_room_for_other_addresses(
     unread.transport.abort.assert_called_once()
 
 
+def test_no_address_makes_more_room_than_another_that_has_as_many(protocol: type[BoundedConnection]) -> None:
+    """All that go together had been of the one that had most, be it by one."""
+    config, state = (
+        uvicorn.Config(hello, lifespan="off", ws="none", limit_concurrency=100),
+        uvicorn.server.ServerState(),
+    )
+    config.load()
+    told = {"is_closing.return_value": True, "get_write_buffer_size.return_value": 10}
+    held = {
+        address: [
+            Mock(client=(address, k), transport=Mock(**told), is_let_go=False, idle_since=0.0) for k in range(count)
+        ]
+        for address, count in (("10.0.0.1", 52), ("10.0.0.2", 50))
+    }
+    state.connections.update(*held.values())
+
+    async def connect_another() -> None:
+        protocol(config, state, {}, per_address=100).connection_made(Mock())  # type: ignore[arg-type]
+
+    asyncio.run(connect_another())
+    stay = [sum(not each.is_let_go for each in of_one) for of_one in held.values()]
+    assert sorted(stay) == [48, 49]
+
+
 def test_whose_answer_under_way_is_not_read_is_let_go(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", TIMEOUT)
     connection = connect()
