@@ -526,7 +526,7 @@ def _require_same(asked: Mapping[str, str | float], answer: Any) -> None:
     """Raise ``UnexpectedAnswer`` where what an answer says it was asked is not what was sent."""
     for name, value in asked.items():
         answered = getattr(answer, name)
-        sent = value if isinstance(value, str) else float(str(value))  # as the address has it
+        sent = float(str(value)) if isinstance(answered, int | float) else value  # as the address has it
         if answered != sent and (name, value) != ("method", "auto"):
             raise UnexpectedAnswer(f"the answer is to another question: its {name} is {answered!r}, asked {sent!r}")
 

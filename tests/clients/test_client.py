@@ -713,6 +713,10 @@ def test_friction_that_was_not_asked_for_is_refused_by_name(
         ask(service(answers.friction | told | change), "friction", "paper", v, 0.05, **question)
 
 
+def test_numbers_may_be_text_as_the_address_has_them(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    assert ask(service(answers.friction), "friction", "paper", "0.0", "5e-2", "0.05").normal_force == 0.05
+
+
 def test_of_one_element_the_number_of_a_contact_s_is_not_told(
     ask: Ask, service: Service, answers: SimpleNamespace
 ) -> None:
