@@ -39,7 +39,7 @@ def starting_server(folder: Path, say: Callable[[str], object] = print) -> Itera
     port = _free_port()
     log = folder / "server.log"
     command = [sys.executable, "-m", "service.cli", "serve", "--host", "127.0.0.1", "--port", str(port)]
-    environment = os.environ | {"STICTION_DATA_FOLDER": str(folder)}
+    environment = {"STICTION_LEAST_FREE_BYTES": "0"} | os.environ | {"STICTION_DATA_FOLDER": str(folder)}
     with log.open("wb") as output:
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:

@@ -312,7 +312,7 @@ def _material(session: Session, settings: Settings, received: ReceivedLog) -> in
 
 
 def _check_before(context: Context, request: UploadRequest) -> int | None:
-    """The same, and whether there is room for them."""
+    """What ``_check`` does, where there is room for the bytes and for what follows from them."""
     context.require_room()
     return _check(context, request)
 

@@ -2,7 +2,6 @@
 
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -16,8 +15,8 @@ from db.errors import StorageUnavailable
 @pytest.fixture
 def free(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     """Bytes free in folders by their names."""
-    free = {"spool": 1000, "elsewhere": 1000}
-    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free[Path(folder).name]))
+    free = {"spool": 1000, "elsewhere": 1000, "total": 2000}
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: (free["total"], 0, free[Path(folder).name]))
     return free
 
 
@@ -32,6 +31,11 @@ def test_too_little_room_is_said_of_the_store_whose_disk_has_it(tmp_path: Path, 
     with pytest.raises(StorageUnavailable, match=r"^database sqlite.*nearly full, 10 bytes are free; allowed: 1000$"):
         free_room.require(database, blobs, 1000)
     free_room.require(database, blobs, 0)
+
+
+def test_a_file_system_that_says_nothing_of_its_size_takes_uploads(tmp_path: Path, free: dict[str, int]) -> None:
+    free |= {"spool": 0, "total": 0}
+    free_room.require(Mock(spec=Database, disk=None), BlobStore(tmp_path), 1000)
 
 
 def test_the_room_is_what_the_file_system_says(tmp_path: Path) -> None:

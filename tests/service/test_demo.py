@@ -62,6 +62,20 @@ def test_a_server_that_compiles_is_waited_for_and_told_of_once(tmp_path: Path, m
     assert "compiled" in said[0]
 
 
+def test_the_demo_s_server_is_ready_on_a_small_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It waited ten minutes, and then said nothing of the disk."""
+    started: list[dict[str, str]] = []
+
+    def start(*_: object, env: dict[str, str], **__: object) -> Any:
+        started.append(env)
+        return SimpleNamespace(terminate=lambda: None, wait=lambda **_: 0)
+
+    monkeypatch.delenv("STICTION_LEAST_FREE_BYTES", raising=False)
+    monkeypatch.setattr(subprocess, "Popen", start)
+    with server.starting_server(tmp_path):
+        assert started[0]["STICTION_LEAST_FREE_BYTES"] == "0"
+
+
 def test_a_server_that_ended_is_not_waited_for(tmp_path: Path) -> None:
     (tmp_path / "server.log").write_text("the port is taken")
     ended: Any = SimpleNamespace(poll=lambda: 1)
