@@ -4,8 +4,9 @@ Friction takes the ratio of two components of force, so that a zero that is off 
 it is measured, and alike: neither force, place nor scatter shows it. The markers do.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,8 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
     if _likeness(-read[..., 2], held) > seen.limits.contact_likeness:  # markers were zeroed during a touch
         return
     touched = touched_elements(seen)
-    off, pressed = _alike(read[touched], force[rest][:, touched], seen.limits), float(held[touched].mean())
+    noise = (_of_medians(force[rest][:, touched]),)
+    off, pressed = _alike(read[touched], noise, seen.limits), float(held[touched].mean())
     if 0.0 < seen.limits.zero_share * pressed < off:
         share = f"{off / pressed:.0%} of their force in the grasp"
         evidence = f"elements read {1e3 * off:.2g} mN in the mean while nothing moves them, {share}"
@@ -46,7 +48,8 @@ def zero_drift(seen: Subject) -> Iterator[Finding]:
         if min(np.count_nonzero(early), np.count_nonzero(late)) < seen.limits.least_rest or not elements.any():
             continue
         moved = np.median(force[late], axis=0) - np.median(force[early], axis=0)
-        off = _alike(moved[elements], force[late][:, elements], seen.limits, may_leak=elements is not touched)
+        noise = tuple(_of_medians(force[when][:, elements]) for when in (early, late))
+        off = _alike(moved[elements], noise, seen.limits, may_leak=elements is not touched)
         if 0.0 < seen.limits.zero_share * pressed < off:
             share = f"{off / pressed:.0%} of the force of elements in the grasp"
             evidence = f"elements {where} read {1e3 * off:.2g} mN more at its end than at its begin, {share}"
@@ -185,22 +188,36 @@ def _is_flat_below(normal: FloatArray, place: FloatArray, limits: CheckOptions) 
     return bool(turns and size[2] * root < limits.flat_places * spread * float(np.hypot(*size[:2])))
 
 
-def _alike(read: FloatArray, readings: FloatArray, limits: CheckOptions, may_leak: bool = False) -> float:
-    """What elements read alike, N, beyond noise: of medians [k, 3] of ``readings`` [t, k, 3].
+class MedianNoise(NamedTuple):
+    """Variance [3] N² of elements' medians by noise, their mean, and by how many ``degrees`` of freedom it is known."""
+
+    variance: FloatArray
+    degrees: int
+
+
+def _of_medians(readings: FloatArray) -> MedianNoise:
+    """Of ``readings`` [t, k, 3] N over their frames."""
+    frames, count, _ = readings.shape
+    return MedianNoise(0.5 * np.pi * readings.var(axis=0, ddof=1).mean(axis=0) / frames, count * (frames - 1))
+
+
+def _alike(read: FloatArray, medians: Sequence[MedianNoise], limits: CheckOptions, may_leak: bool = False) -> float:
+    """What elements read alike, N, beyond noise: of ``read`` [k, 3], by the ``medians`` that it is the difference of.
 
     What differs from element to element, as noise that outlasts the rest does, moves friction nowhere in the mean. What
     ``may_leak`` to them of a contact that changes falls off with their distance: it differs by as much as its mean.
-    Each component is compared with its own noise, by Student's distribution where that is known from few elements, so
-    that none hides what another shows.
+    Each component is compared with its own noise, by Student's distribution where that is known from few elements or
+    frames, so that none hides what another shows.
     """
     from scipy.special import stdtrit
 
     count, square = len(read), read.mean(axis=0) ** 2
     lasting = read.var(axis=0, ddof=min(count - 1, 1))
-    passing = 0.5 * np.pi * readings.var(axis=0, ddof=1).mean(axis=0) / len(readings)  # of medians
-    leak = float(may_leak) * np.maximum(lasting - 2.0 * passing, 0.0)  # of two medians that are compared
-    errors = float(stdtrit(max(count - 1, 1), NormalDist().cdf(limits.zero_errors)))
-    least = np.maximum(errors**2 * lasting, limits.zero_errors**2 * passing) / count + limits.leak_variances * leak
+    passing = np.sum([each.variance for each in medians], axis=0)
+    leak = float(may_leak) * np.maximum(lasting - passing, 0.0)
+    between, within = max(count - 1, 1), min(each.degrees for each in medians)
+    errors = stdtrit(np.array([between, within]), NormalDist().cdf(limits.zero_errors))
+    least = np.maximum(errors[0] ** 2 * lasting, errors[1] ** 2 * passing) / count + limits.leak_variances * leak
     noise = np.maximum(lasting, passing) / count + leak
     return float(np.sqrt(np.where(square > least, square - noise, 0.0).sum()))
 
