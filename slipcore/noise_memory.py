@@ -97,7 +97,7 @@ def lasting_noise_of(time: FloatArray, series: FloatArray, window: float, least:
     if not squares.min() > 0.0 or squares[0] < least**2 or squares[1] * shortest[0] < squares[0] * shortest[1]:
         return WHITE
     found = fit_memory(squares, terms, longest=math.exp(-1.0 / (NOISE.longest_memory * float(lags[-1]))))
-    return Lasting(found.deviation / math.sqrt(float(squares[0])), found.frames)
+    return Lasting(max(found.deviation / math.sqrt(float(squares[0])), 1.0), found.frames)
 
 
 def _noise_at(time: FloatArray, series: FloatArray, lag: int) -> float:

@@ -63,6 +63,11 @@ def lasting(shape: Shape, rng: np.random.Generator) -> FloatArray:
     return np.asarray(lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], noise, axis=0)[settling:])
 
 
+def both(shape: Shape, rng: np.random.Generator) -> FloatArray:
+    """``lasting`` noise that is ``smoothed`` as well."""
+    return np.asarray(gaussian_filter(lasting(shape, rng), (0.0, SMOOTHING, SMOOTHING, 0.0)))
+
+
 Noise = Callable[[Shape, np.random.Generator], FloatArray]
 NOISES: tuple[tuple[Noise, float], ...] = (
     (white, 1e-4),
@@ -71,6 +76,7 @@ NOISES: tuple[tuple[Noise, float], ...] = (
     (common, 5e-3),
     (smoothed, 5e-3),
     (lasting, 5e-3),
+    (both, 5e-3),
 )
 """And N, of forces."""
 
@@ -154,7 +160,7 @@ def held() -> list[Bounds]:
     """Loads held for 2 s, without what is taken off for errors of sums, which are exact here."""
     sums, found = 1.0 - NORMAL_95 * PatchOptions().resultant_error, []
     for side in ARRAYS:
-        for kind in (white, common, smoothed, lasting):
+        for kind in (white, common, smoothed, lasting, both):
             noises = (HELD_NOISE * kind((60, side, side, 3), np.random.default_rng(s)) for s in range(HELD_SEEDS))
             lows = np.array([held_by(np.ones((side, side), bool), HELD, each).low for each in noises]) / (HELD * sums)
             found.append(summary(side, kind, HELD_NOISE, lows, float(np.median(lows))))

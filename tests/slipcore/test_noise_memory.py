@@ -58,6 +58,13 @@ def test_white_noise_under_loads_that_change_does_not_last() -> None:
         assert lasting_noise_of(TIME, loads + series(1e-3, seed)[0], 0.5, 1e-4) == WHITE
 
 
+@pytest.mark.parametrize("hertz", [1.0, 2.0, 4.0])
+def test_no_noise_is_less_than_three_frames_show(hertz: float) -> None:
+    """Of loads that bend from frame to frame by more than their noise."""
+    loads = 0.2 * np.sin(2.0 * np.pi * hertz * TIME)[:, None, None] * np.linspace(0.0, 1.0, 64)
+    assert lasting_noise_of(TIME, loads + series(1e-3, 0)[0], 0.5, 1e-4).gain >= 1.0
+
+
 def test_little_noise_few_frames_and_few_series_show_nothing_of_how_it_lasts() -> None:
     noise = series(5e-3, 0)[1]
     assert lasting_noise_of(TIME, 1e-3 * noise, 0.5, 1e-4) == WHITE
