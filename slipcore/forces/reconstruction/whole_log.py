@@ -72,7 +72,7 @@ class Reconstruction:
         deviation = self.force_noise if self.shows_pressure else float(np.abs(self.force).max())
         told = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
         contact = log.contact
-        if contact is None or log.metadata.get("contact") == BY_MOTION:
+        if contact is None or log.metadata.get("contact") in (BY_MOTION, BY_FORCES):
             contact, told["contact"] = self._contact_of(log)
         return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **told})
 

@@ -381,6 +381,9 @@ def test_the_log_tells_how_unsure_its_reconstructed_forces_are(pressed: Pressed)
     assert known.force_deviation == pytest.approx(found.force_noise, rel=1e-3)
     assert known.contact is not None
     np.testing.assert_array_equal(known.contact, found.contact)
+    again = replace(found, contact=np.zeros_like(found.contact)).apply(known)
+    assert again.contact is not None
+    assert not again.contact.any(), "of a log reconstructed before no contact is kept"
     assert log.force_deviation == 0.0
     for told in ("no number", "-1", "nan", "inf"):
         assert replace(known, metadata={**known.metadata, "force_deviation": told}).force_deviation == 0.0
