@@ -22,6 +22,7 @@ from benchmarks.forces.scenes import CELL, PROGRESS, SIDE, Lattice, Truth, press
 from benchmarks.pages import table
 from service import formats
 from slipcore import GraspLog
+from slipcore.defaults import NORMAL_95
 from slipcore.forces import Gel, reconstruct
 from slipcore.frames import BoolArray, FloatArray
 
@@ -33,13 +34,12 @@ NOISES = (0.0, 10e-6, 30e-6)
 """Of a pixel, m; twenty-five of them are an element of a grid of 20 × 20."""
 GRID, GRIDS = 20, (10, 25, 33)
 """Elements along a side, and those that it is compared with."""
-NORMAL_95 = 1.959964
-
-
 LOADS = {"straight": PROGRESS[:1], "sheared": PROGRESS[1:]}
 """Presses straight down, and with up to 2.8 N aside."""
 HELD = 5
 """Frames of each load, by which noise shows."""
+SETTLED = 10
+"""Steps in which the point that came to a place is found: each leaves as much as a length is stretched, a quarter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,13 +102,18 @@ def _count(holds: BoolArray) -> tuple[int, int]:
 def heights(truth: Truth, noise: float, rng: np.random.Generator) -> FloatArray:
     """Maps [1 + t, rows, columns] m, the first at rest: what rises at each place, which its point came to sideways."""
     moved = truth.log.displacement.transpose(0, 3, 2, 1)
-    rows, columns = np.indices(moved.shape[2:])
-    at_places = [
-        map_coordinates(frame[2], [rows - frame[1] / CELL, columns - frame[0] / CELL], order=1, mode="nearest")
-        for frame in moved
-    ]
-    maps = np.concatenate((np.zeros((1, *rows.shape)), at_places))
+    maps = np.stack([np.zeros(moved.shape[2:]), *map(_at_places, moved)])
     return np.asarray(maps + noise * rng.standard_normal(maps.shape))
+
+
+def _at_places(moved: FloatArray) -> FloatArray:
+    """What rises [rows, columns] m at each place, by displacements [3, rows, columns] m of the points."""
+    place = np.indices(moved.shape[1:]).astype(float)
+    came_from = place
+    for _ in range(SETTLED):
+        aside = [map_coordinates(moved[axis], came_from, order=1, mode="nearest") for axis in (1, 0)]
+        came_from = place - np.array(aside) / CELL
+    return np.asarray(map_coordinates(moved[2], came_from, order=1, mode="nearest"))
 
 
 def read(maps: FloatArray, side: int) -> GraspLog:
