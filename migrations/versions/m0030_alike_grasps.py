@@ -18,5 +18,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
+    # without a signature they are looked at again once they are sent again: they would count beside the others for good
+    op.execute("UPDATE detections SET signature = NULL WHERE alike IS NOT NULL")
     with op.batch_alter_table("detections") as table:
         table.drop_column("alike")

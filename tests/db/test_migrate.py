@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from alembic.script import ScriptDirectory
-from sqlalchemy import inspect, text, update
+from sqlalchemy import inspect, select, text, update
 
 from db import migrate
 from db.database import Database
@@ -441,6 +441,22 @@ def test_what_the_way_back_would_lose_is_named_and_kept(
         migrate.downgrade(database, revision)
     assert migrate.current(database) == before
     migrate.downgrade(database, revision, lose=True)
+
+
+@pytest.mark.parametrize("alike", [None, ["2" * 64]])
+def test_logs_that_share_frames_are_looked_at_again_after_a_way_back(
+    database: Database, fill: Callable[[], None], alike: list[str] | None
+) -> None:
+    """They counted beside those others for good, also where they were sent again."""
+    fill()
+    with database.write() as session:
+        session.execute(update(DetectionRow).values(fingerprint="1" * 64, signature=b"f", alike=alike))
+    migrate.downgrade(database, "0029", lose=True)
+    migrate.upgrade(database)
+    with database.read() as session:
+        assert detections.has_signature(session, session.scalars(select(DetectionRow.grasp_log_id)).one()) == (
+            not alike
+        )
 
 
 def test_a_key_that_expires_stops_the_way_back(database: Database) -> None:
