@@ -147,7 +147,8 @@ class ForceStream:
         """What it is told of the contact, and of how unsure forces are, N."""
         if self._tracking is None or self._tracking.sensor.shows_pressure:
             return forces.contact if 2 in self._axes else None, forces.force_noise
-        return taken_along(moved_by, self._noise or 0.0), float(np.abs(forces.force).max())
+        noise = np.inf if self._noise is None else self._noise
+        return taken_along(moved_by, noise), float(np.abs(forces.force).max())
 
     def _checked(
         self, time: float, displacement: ArrayLike, observed: ArrayLike | None

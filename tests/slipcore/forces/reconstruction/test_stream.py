@@ -92,6 +92,17 @@ def test_in_the_plane_of_a_thick_gel_a_detector_is_told_the_contact_by_motion(
             np.testing.assert_array_equal(contact, taken_along(log.displacement[k], NOISE))
 
 
+def test_in_the_plane_of_a_thick_gel_nothing_touches_until_the_noise_is_known(pressed: Pressed) -> None:
+    """By no noise at all a quarter of the markers had moved."""
+    log = pressed(LIGHT, crop=INSIDE)
+    stream = ForceStream(log.position, log.element_area, replace(GEL, thickness=np.inf))
+    for k in range(16):
+        found = stream.step(k / 30.0, still(log, 2, k))
+        assert (found.wait_for == "noise") == (k < 14)
+        assert found.contact is not None
+        assert not found.contact.any()
+
+
 @pytest.mark.long
 def test_in_the_plane_alone_the_contact_is_found_too(pressed: Pressed) -> None:
     log = pressed([3, 3], noise=NOISE, axes=2)
