@@ -438,7 +438,7 @@ class FilterOptions(ContactOptions):
     """Least variance of that noise over that of the pose fitted to the markers."""
     force_noise_margin: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.1
     """Factor on the estimated noise of element forces."""
-    force_floor: Annotated[float, Option(0.0, 1e3, "N", "0: none; of reconstructed forces their own deviation")] = 0.0
+    force_floor: Annotated[float, Option(0.0, 1e4, "N", "0: none; of reconstructed forces their own deviation")] = 0.0
     """Noise of element forces that lasts, which no change from frame to frame shows."""
     force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.036
     """Time constant of the low-pass on element forces."""

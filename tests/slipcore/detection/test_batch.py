@@ -15,6 +15,7 @@ from slipcore import (
     collect_history,
     detect_slip,
 )
+from slipcore.defaults import LIMITS
 from slipcore.detection.detector import init, step
 from slipcore.detection.filter.method import METHOD
 from slipcore.detection.filter.state import END, ONSET, PROBABILITY, ROWS
@@ -139,3 +140,11 @@ def test_what_reconstructed_forces_are_unsure_of_is_noise_that_lasts(scene: Scen
     alone = detect_slip(replace(known, force=None, metadata={}))
     assert f1_score(log, found) > f1_score(log, alone) - 0.01
     assert f1_score(log, found) > f1_score(log, as_measured) + 0.01
+
+
+def test_forces_as_unsure_as_they_may_be_large_are_taken(short_ramp: GraspLog) -> None:
+    """As of a gel that was described in the wrong unit: the option's own bound was a tenth of that of forces."""
+    told = {"force": "reconstructed", "force_deviation": str(LIMITS.force)}
+    unsure = replace(short_ramp, metadata=told)
+    assert unsure.force_deviation == LIMITS.force
+    assert len(detect_slip(unsure).slip) == len(short_ramp)
