@@ -37,8 +37,9 @@ def response_matrices(
     """
     cells, finer = RESPONSE.cells, RESPONSE.finer
     offsets, places = zip(*(_offsets(position, each, pitch / cells) for each in nodes), strict=True)
-    reach = int(np.ceil(max(np.abs(offset).max() for offset in offsets))) + 3  # a cubic spline ends three cells beyond
     close = RESPONSE.near * cells
+    farthest = int(np.ceil(max(np.abs(offset).max() for offset in offsets)))
+    reach = max(farthest + 3, close)  # a cubic spline ends three cells beyond
     far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
     middle = (slice(reach - close, reach + close + 1),) * 2
     matrices = [np.empty((len(axes), len(position), 3, len(each))) for each in nodes]

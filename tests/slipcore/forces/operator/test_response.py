@@ -125,3 +125,16 @@ def test_offsets_that_are_alike_are_evaluated_once_and_alike(monkeypatch: pytest
         np.testing.assert_allclose(response_matrix(gel, nodes, lattice[[k]])[:, 0], whole[:, k], rtol=1e-6, atol=1e-14)
     (along_normal,) = response_matrices(gel, 1e-3, [nodes.places()], lattice, axes=(2,))
     np.testing.assert_array_equal(along_normal, whole[2:])
+
+
+@pytest.mark.parametrize("side", [1, 2, 3])
+def test_few_nodes_near_their_markers_move_them_as_they_do_among_others(side: int) -> None:
+    """Closer than where finer cells end, as heights of 2 × 2 or 3 × 3 elements are taken to points."""
+    gel, pitch, many = Gel(1e6, 0.49, 5e-3), 1e-3, 8
+    line = pitch * np.arange(many)
+    place = np.stack([each.ravel() for each in np.meshgrid(line, line)], axis=-1)
+    few = (place < (side - 0.5) * pitch).all(axis=1)
+    (found,) = response_matrices(gel, pitch, [place[few]], place[few])
+    (among,) = response_matrices(gel, pitch, [place], place)
+    assert found.shape == (3, side**2, 3, side**2)
+    np.testing.assert_allclose(found, among[:, few][..., few], rtol=1e-3, atol=1e-3 * np.abs(among).max())
