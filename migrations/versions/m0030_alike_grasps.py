@@ -15,6 +15,10 @@ LOST_ON_THE_WAY_BACK = (
 
 def upgrade() -> None:
     op.add_column("detections", sa.Column("alike", sa.JSON(), nullable=True))
+    # 0029 had this column at first, which nothing reads: databases that were upgraded by then have it still
+    if "clock_log_number" in {column["name"] for column in sa.inspect(op.get_bind()).get_columns("store")}:
+        with op.batch_alter_table("store") as table:
+            table.drop_column("clock_log_number")
 
 
 def downgrade() -> None:

@@ -329,6 +329,15 @@ def test_servers_that_start_at_once_upgrade_once(empty_database: Database) -> No
     assert migrate.check(empty_database) is None
 
 
+def test_a_column_that_0029_had_at_first_goes(database: Database) -> None:
+    migrate.downgrade(database, "0029", lose=True)
+    with database.connect() as connection:
+        connection.exec_driver_sql("ALTER TABLE store ADD COLUMN clock_log_number INTEGER")
+        connection.commit()
+    migrate.upgrade(database)
+    migrate.check(database)
+
+
 @ONLY_SQLITE
 @pytest.mark.parametrize("made", ["CREATE TABLE notes (line TEXT)", "CREATE VIEW notes AS SELECT 1 AS line"])
 def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_database: Database, made: str) -> None:
