@@ -34,8 +34,12 @@ def test_too_little_room_is_said_of_the_store_whose_disk_has_it(tmp_path: Path, 
 
 
 def test_a_file_system_that_says_nothing_of_its_size_takes_uploads(tmp_path: Path, free: dict[str, int]) -> None:
-    free |= {"spool": 0, "total": 0}
-    free_room.require(Mock(spec=Database, disk=None), BlobStore(tmp_path), 1000)
+    blobs, database = BlobStore(tmp_path), Mock(spec=Database, disk=None)
+    free["spool"] = 0
+    with pytest.raises(StorageUnavailable, match="nearly full"):
+        free_room.require(database, blobs, 1000)
+    free["total"] = 0
+    free_room.require(database, blobs, 1000)
 
 
 def test_the_room_is_what_the_file_system_says(tmp_path: Path) -> None:

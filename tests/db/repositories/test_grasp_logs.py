@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 
 import pytest
 from sqlalchemy import event, func, select, update
@@ -116,6 +117,15 @@ def test_samples_of_a_material_are_one_part_a_grasp(
         assert [found.samples_blob for found in detections.samples_of_material(session, paper)] == ["3" * 64, "2" * 64]
 
 
+def copies_of_counted(database: Database, material_id: str) -> dict[str, tuple[str, ...]]:
+    """The logs of a material that count, with the copies of each, which both queries agree on."""
+    with database.read() as session:
+        found = detections.samples_of_material(session, material_id)
+        newest = [log.samples.grasp_log_id for log in detections.newest_sampled_logs(session, material_id, 9)]
+    assert sorted(newest) == sorted(part.grasp_log_id for part in found)
+    return {part.grasp_log_id: part.copies for part in found}
+
+
 def test_of_logs_of_one_grasp_the_first_that_is_not_withdrawn_counts(
     database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
 ) -> None:
@@ -127,13 +137,7 @@ def test_of_logs_of_one_grasp_the_first_that_is_not_withdrawn_counts(
         for name in reversed(prints):  # the first was found last
             detections.add(session, ids[name], replace(detection, fingerprint=prints[name]), samples)
 
-    def counted() -> dict[str, tuple[str, ...]]:
-        with database.read() as session:
-            found = detections.samples_of_material(session, paper)
-            newest = [log.samples.grasp_log_id for log in detections.newest_sampled_logs(session, paper, 9)]
-        assert sorted(newest) == sorted(part.grasp_log_id for part in found)
-        return {part.grasp_log_id: part.copies for part in found}
-
+    counted = partial(copies_of_counted, database, paper)
     alone: dict[str, tuple[str, ...]] = {ids[name]: () for name in "cdf"}
     assert counted() == alone | {ids["a"]: (ids["b"],)}
     with database.write() as session:
@@ -202,13 +206,7 @@ def test_grasps_that_one_recording_holds_are_one_beside_it_alone(
         with database.write() as session:
             detections.add(session, log_id, found, replace(samples, count=500 if number == whole else 100))
 
-    def counted() -> dict[str, tuple[str, ...]]:
-        with database.read() as session:
-            found = detections.samples_of_material(session, paper)
-            newest = [log.samples.grasp_log_id for log in detections.newest_sampled_logs(session, paper, 9)]
-        assert sorted(newest) == sorted(part.grasp_log_id for part in found)
-        return {part.grasp_log_id: part.copies for part in found}
-
+    counted = partial(copies_of_counted, database, paper)
     cuts = tuple(each for each in ids if each != ids[whole])
     assert counted() == {ids[whole]: cuts}
     with database.write() as session:
