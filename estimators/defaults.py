@@ -335,7 +335,7 @@ class RobustSettings(Options):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings(Options):
     """Errors that samples share (``linear/``: ``cluster_errors``, ``shared_errors``, ``observations``,
-    ``grasp_statistics``, ``within_places``, ``place_correlation``).
+    ``grasp_statistics``, ``within_places``, ``place_correlation``, ``slopes_of_grasps``).
     """
 
     few: Annotated[int, Option(1, 100, "clusters", "9 for the three coefficients")] = 3
@@ -360,6 +360,8 @@ class ClusterSettings(Options):
     """That are kept one by one."""
     most_groups: Annotated[int, Option(2, 1_000_000, "groups", "88 bytes each")] = 170
     """Of places of about the same weight that more places are pooled into."""
+    above_scatter: Annotated[float, Option(1.0, 10.0, "-", "factors from 0 to 2, and any τ up to 0.5")] = 2.0
+    """Of the law over what grasps scatter by, from which their levels tell of factors."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

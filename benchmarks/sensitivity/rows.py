@@ -162,8 +162,16 @@ def table_of(found: list[Row]) -> str:
         cells = [f"{value:+.3f}" for name in measures for value in row.changes.get(name, ())]
         cells = cells or [row.failed] + [""] * (2 * len(measures) - 1)
         lines.append(f"| {row.table} | `{row.name}` | {row.default:g} {row.unit} | " + " | ".join(cells) + " |")
-    quiet = [f"`{row.name}` of {row.table}" for row in found if row.largest < DEAD]
-    return "\n".join(lines) + (f"\n\nLess than {DEAD:g} by either: {', '.join(quiet)}." if quiet else "")
+    return "\n".join(lines + _without_effect(found))
+
+
+def _without_effect(found: list[Row]) -> list[str]:
+    """A second table, of the defaults that change nothing to speak of."""
+    quiet: dict[str, dict[str, None]] = {}
+    for row in (row for row in found if row.largest < DEAD):
+        quiet.setdefault(row.table, {})[f"`{row.name}`"] = None
+    lines = [f"| {label} | {', '.join(names)} |" for label, names in quiet.items()]
+    return ["", f"| of | less than {DEAD:g} by either |", "|---|---|", *lines] if lines else []
 
 
 def tables_of_options() -> dict[str, type[Options]]:
@@ -199,6 +207,7 @@ def rows_on(page: str, part: str) -> list[Row]:
             values = [] if failed else [float(each) for each in texts]
             pairs = zip(measures, zip(values[::2], values[1::2], strict=True), strict=not failed)
             kept.append(Row(label, name, *now[label, name], dict(pairs), failed))
-    quiet = [(label, name) for name, label in re.findall(r"`(\w+)` of ([\w.]*\w)", text)]
+    listed = re.findall(r"^\| (\S+) \| ((?:`\w+`(?:, )?)+) \|$", text, re.MULTILINE)
+    quiet = [(label, name) for label, names in listed for name in re.findall(r"\w+", names)]
     still = dict.fromkeys(measures, (0.0, 0.0))
     return kept + [Row(*key, *now[key], dict(still)) for key in quiet if key in now]

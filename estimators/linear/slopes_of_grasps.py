@@ -76,12 +76,12 @@ def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> FloatArray:
     """By which the level of each grasp is off the law; 1 where the law is hardly more than what grasps scatter by.
 
     A quotient there tells of scatter, not of a factor, and has any size and sign. Where the law is above twice the
-    scatter, levels off by two of its deviations have factors from 0 to 2. Grasps that differ by factors have the law
-    above twice their scatter up to a τ of 0.5.
+    scatter (``above_scatter``), levels off by two of its deviations have factors from 0 to 2. Grasps that differ by
+    factors have the law above twice their scatter up to a τ of 0.5.
     """
     means = np.stack([np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count) for grasp in grasps])
     expected, friction = law[0] + means[:, :2] @ law[1:], means[:, 2]
     scatter = np.sqrt(np.square(friction - expected).mean())
     factors = np.ones(len(means))
-    np.divide(friction, expected, out=factors, where=np.abs(expected) > 2.0 * scatter)
+    np.divide(friction, expected, out=factors, where=np.abs(expected) > CLUSTERS.above_scatter * scatter)
     return factors

@@ -80,7 +80,7 @@ def test_the_most_sensitive_comes_first_after_what_fails_and_the_rest_below_the_
     lines = table_of([quiet, small, broken, loud]).splitlines()
     assert [line.split("`")[1] for line in lines[2:5]] == ["broken", "loud", "small"]
     assert lines[3] == "| a | `loud` | 1 m | +0.000 | +0.300 |"
-    assert lines[-1] == "Less than 0.001 by either: `quiet` of a."
+    assert lines[-3:] == ["| of | less than 0.001 by either |", "|---|---|", "| a | `quiet` |"]
 
 
 def test_what_a_page_has_is_read_as_it_was_written_and_what_was_another_is_not() -> None:
