@@ -74,6 +74,7 @@ def run_module(command: tuple[str, ...], environment: dict[str, str], log: Path)
             os.dup2(stream.fileno(), output)
     os.environ.update(environment)
     sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
+    sys.modules.pop("sitecustomize", None)  # Debian's Python has one of its own, which was imported before the path was
     site.execsitecustomize()  # as at the start of an interpreter
     sys.argv[:] = command
     runpy.run_module(command[0], run_name="__main__", alter_sys=True)
