@@ -140,6 +140,7 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
 
     def grasp(mark: str) -> str:
         while mark in joined:
+            joined[mark] = joined.get(joined[mark], joined[mark])  # halves the way for all who go it again
             mark = joined[mark]
         return mark
 
