@@ -22,7 +22,7 @@ import estimators
 import slipcore
 from benchmarks.pages import options, picture_folder, save, table, write
 from estimators import Moments
-from service.jobs.pipeline import FITS_BESIDE_OTHERS
+from service.jobs.pipeline import MOST_REPEATS
 from slipcore.contact import RampSchedule, tangential_ramp
 
 Array = NDArray[np.float64]
@@ -138,7 +138,7 @@ class Ingests:
             moment = yield self._costs.fit + self._costs.fit_per_log * (self._logs_before + count)
             self.fits += 1
             tries += 1
-            is_newest, is_last = count == len(came), tries > FITS_BESIDE_OTHERS and not self._coalesced
+            is_newest, is_last = count == len(came), tries > MOST_REPEATS and not self._coalesced
             if is_newest or is_last or self._coalesced:  # else it is not stored
                 self.fitted[came[self._covered[material] : count]] = moment
                 self._covered[material] = max(self._covered[material], count)

@@ -18,14 +18,17 @@ _OTHERWISE = {"tangential_velocity", "normal_force", "scales"}
 _PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in _OTHERWISE)
 
 
-def add(session: Session, material_id: int, job_id: str, model: NewModel) -> int:
-    """Store a model as the next version and make it the current one; returns the version."""
+def add(session: Session, material_id: int, job_id: str, model: NewModel, *, outdated: bool = False) -> int:
+    """Store a model as the next version and make it the current one; returns the version.
+
+    ``outdated``: the material's logs are others by now than those that it was fitted to.
+    """
     lock(session, material_id)
     of_this_kind = (FrictionModelRow.material_id == material_id, FrictionModelRow.method == model.method)
     newest = session.scalar(select(func.max(FrictionModelRow.version)).where(*of_this_kind))
     version = (newest or 0) + 1
     session.execute(update(FrictionModelRow).where(*of_this_kind, FrictionModelRow.current).values(current=False))
-    session.add(_row(material_id, job_id, version, model))
+    session.add(_row(material_id, job_id, version, model, outdated))
     session.flush()
     return version
 
@@ -145,12 +148,13 @@ def _models() -> Select[FrictionModelRow, str]:
     return select(FrictionModelRow, MaterialRow.name).join(MaterialRow)
 
 
-def _row(material_id: int, job_id: str, version: int, model: NewModel) -> FrictionModelRow:
+def _row(material_id: int, job_id: str, version: int, model: NewModel, outdated: bool) -> FrictionModelRow:
     return FrictionModelRow(
         material_id=material_id,
         job_id=job_id,
         version=version,
         current=True,
+        outdated=outdated,
         tangential_velocity_min=model.tangential_velocity[0],
         tangential_velocity_max=model.tangential_velocity[1],
         normal_force_min=model.normal_force[0],

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
+from itertools import count
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,7 +21,7 @@ import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Detection, Gel, Job, NewModel, SamplesOfLog, SampleSummary
-from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
 from service import formats
@@ -52,9 +53,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FITS_BESIDE_OTHERS = 3
-"""Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
-
+MOST_REPEATS = 3
+"""Of a fit whose logs changed under it: nobody who writes waits for a fit, which may take minutes."""
 
 FITTED_AT_INGEST = ("hierarchical", "ols")
 """What the methods of an ingest store their models as."""
@@ -213,9 +213,12 @@ def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSum
 
 
 def fit_material(run: Run) -> None:
-    """Moments or samples of all logs of a material → friction_model → material; raises ``InsufficientData``."""
+    """Moments or samples of all logs of a material → friction_model → material; raises ``InsufficientData``.
+
+    Done again where its logs changed meanwhile; where they do so all the time, the models are stored as outdated.
+    """
     _note_missing_moments(run)
-    for _ in range(FITS_BESIDE_OTHERS):
+    for tries in count():
         with run.stage("friction_model"):
             with run.database.read() as session:
                 material_id = jobs.material_id(session, run.job.id)
@@ -224,15 +227,10 @@ def fit_material(run: Run) -> None:
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
-            if is_still and detections.samples_of_material(session, material_id) == basis.parts:
-                _store_models(run, session, material_id, models)
+            parts = detections.samples_of_material(session, material_id) if is_still else []
+            if parts == basis.parts or (parts and tries >= MOST_REPEATS):
+                _store_models(run, session, material_id, models, outdated=parts != basis.parts)
                 return
-    with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
-        material_id = materials.still(session, jobs.material_id(session, run.job.id))
-        friction_models.lock(session, material_id)
-        with run.timed("friction_model"):
-            models = _fit(run, _basis(run, session, material_id))
-        _store_models(run, session, material_id, models)
 
 
 def _with_forces(run: Run, log: GraspLog, gel: Gel | None) -> "tuple[GraspLog, Reconstruction | None]":
@@ -325,15 +323,21 @@ def _note_missing_moments(run: Run) -> None:
                 detections.set_moments(session, part.grasp_log_id, content)
 
 
-def _store_models(run: Run, session: Session, material_id: int, models: Sequence[FrictionModel]) -> None:
-    """Store the models and close the job, in one transaction with what they were fitted to; it names the first."""
+def _store_models(
+    run: Run, session: Session, material_id: int, models: Sequence[FrictionModel], *, outdated: bool
+) -> None:
+    """Store the models and close the job, in one transaction with what they were fitted to; it names the first.
+
+    ``outdated``: that is others by now, so that they are fitted once more where that is cheap.
+    """
     with run.timed("material"):
         # before the models, of which a job may have one a method
         jobs.start_stage(session, run.claim, "material", run.seconds)
         _note_change(run, session, material_id, models[0])
         jobs.outdate_models(session, run.job.id)  # what could not be fitted stays so
-        versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
-        if run.job.kind == "ingest":
+        new = [to_new_model(model) for model in models]
+        versions = [friction_models.add(session, material_id, run.job.id, each, outdated=outdated) for each in new]
+        if run.job.kind == "ingest" or outdated:
             queue_cheap_refits(session, material_id, run.job.requested_by)
     jobs.finish(session, run.claim, "done", model_version=versions[0], seconds=run.seconds)
 

@@ -534,15 +534,13 @@ def test_moments_that_an_older_version_did_not_store_are_made_up_for(
     assert newest.model.coefficients == older.model.coefficients
 
 
-def test_a_fit_that_logs_overtake_again_and_again_makes_the_others_wait(
-    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fit_that_logs_overtake_is_made_again(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     shop.run(shop.ingest(content)[1])
     fit = estimators.fit
     overtaken: list[int] = []
 
     def slow_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
-        if len(overtaken) < pipeline.FITS_BESIDE_OTHERS:
+        if len(overtaken) < pipeline.MOST_REPEATS:
             overtaken.append(len(parts))
             monkeypatch.setattr(estimators, "fit", fit)
             shop.run(shop.ingest(another_grasp(content, len(overtaken)))[1])
@@ -550,8 +548,61 @@ def test_a_fit_that_logs_overtake_again_and_again_makes_the_others_wait(
         return fit(parts, **options)
 
     monkeypatch.setattr(estimators, "fit", slow_fit)
-    assert shop.run(shop.fit()).model_version == 2 + pipeline.FITS_BESIDE_OTHERS
+    assert shop.run(shop.fit()).model_version == 2 + pipeline.MOST_REPEATS
     assert overtaken == [1, 2, 3]
+
+
+def test_nobody_waits_for_a_fit_that_logs_overtake_all_the_time(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last time it was made within a transaction, and whoever wrote to SQLite waited until he was refused."""
+    shop.run(shop.ingest(content)[1])
+    fit, fitted = estimators.fit, list[int]()
+
+    def overtaken_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
+        fitted.append(len(parts))
+        monkeypatch.setattr(estimators, "fit", fit)
+        shop.run(shop.ingest(another_grasp(content, len(fitted)))[1])
+        monkeypatch.setattr(estimators, "fit", overtaken_fit)
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", overtaken_fit)
+    assert shop.run(shop.fit()).status == "done"
+    assert fitted == [1 + tries for tries in range(1 + pipeline.MOST_REPEATS)]
+    assert {stored.model.method: stored.outdated for stored in shop.material().models} == {
+        "hierarchical": False,
+        "ols": True,
+    }
+    monkeypatch.setattr(estimators, "fit", fit)
+    with shop.database.read() as session:
+        refit = jobs.queued_fit(session, shop.material_id, "ols")
+    assert refit is not None
+    assert shop.run(refit).status == "done"
+    assert not any(stored.outdated for stored in shop.material().models)
+
+
+def test_no_model_of_logs_that_were_all_withdrawn_under_its_fit_is_stored(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    fit, fitted = estimators.fit, list[int]()
+
+    def overtaken_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
+        fitted.append(len(parts))
+        monkeypatch.setattr(estimators, "fit", fit)
+        if len(fitted) <= pipeline.MOST_REPEATS:
+            shop.run(shop.ingest(another_grasp(content, len(fitted)))[1])
+        else:
+            with shop.database.write() as session:
+                grasp_logs.withdraw_before(session, shop.material_id, None, "worn", None)
+                friction_models.retire(session, shop.material_id)
+        monkeypatch.setattr(estimators, "fit", overtaken_fit)
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", overtaken_fit)
+    assert shop.run(shop.fit()).status == "refused"
+    assert len(fitted) == 1 + pipeline.MOST_REPEATS
+    assert not shop.material().models
 
 
 def test_too_few_samples_are_refused_with_the_reason(shop: Shop, content: bytes, ramp: GraspLog) -> None:
