@@ -121,10 +121,7 @@ class ModelCache:
 
     def read(self, database: Database, material: str, method: str) -> KnownModel:
         """The model in the database; raises ``NotFound``, and ``NoModel`` where the material has none."""
-        read_at = time.monotonic()
-        with database.read() as session:
-            found = _current(session, {material: materials.find_id(session, material)}, method)
-        return self._keep(material, method, found[material], read_at)
+        return self._read_all(database, [material], method)[material]
 
     def _read_all(self, database: Database, names: Sequence[str], method: str) -> dict[str, KnownModel]:
         read_at = time.monotonic()
@@ -168,10 +165,13 @@ class ModelCache:
         if job.material is None or not self._has_new([change]):
             return
         changed_at = time.monotonic()
+        asked: dict[str, list[str]] = {}  # names by method, of what was asked lately
         for (name, method), known in list(self._known.items()):
-            if known.stored.material == job.material and self._seconds > 0.0:
-                with suppress(NotFound, NoModel, StorageUnavailable):  # who looks it up will be told
-                    self.read(database, name, method)
+            if known.stored.material == job.material and self.fresh(name, method) is not None:
+                asked.setdefault(method, []).append(name)
+        for method, names in asked.items():
+            with suppress(NotFound, NoModel, StorageUnavailable):  # who looks it up will be told
+                self._read_all(database, names, method)
         if len(self._material_changed_at) >= MOST:
             self._material_changed_at, self._changed_at = {}, changed_at
         self._material_changed_at[job.material] = self._last_change_at = changed_at

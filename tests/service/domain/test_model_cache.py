@@ -26,13 +26,13 @@ pytestmark = [
 def read(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The materials that were read from the database."""
     names: list[str] = []
-    original = ModelCache.read
+    original = ModelCache._read_all
 
-    def noting(cache: ModelCache, database: Database, material: str, method: str) -> KnownModel:
-        names.append(material)
-        return original(cache, database, material, method)
+    def noting(cache: ModelCache, database: Database, asked: list[str], method: str) -> dict[str, KnownModel]:
+        names.extend(asked)
+        return original(cache, database, asked, method)
 
-    monkeypatch.setattr(ModelCache, "read", noting)
+    monkeypatch.setattr(ModelCache, "_read_all", noting)
     return names
 
 
@@ -158,15 +158,15 @@ def test_whoever_is_told_of_the_end_meanwhile_does_not_get_ahead_of_the_reading(
 ) -> None:
     cache, depths = ModelCache(60.0), list[int]()
     cache.read(database, "paper", "ols")
-    original = ModelCache.read
+    original = ModelCache._read_all
 
-    def told_meanwhile(*given: Any) -> KnownModel:
+    def told_meanwhile(*given: Any) -> dict[str, KnownModel]:
         depths.append(len(depths))
         if len(depths) == 1:
             cache.has_ended(database, ended)
         return original(*given)
 
-    monkeypatch.setattr(ModelCache, "read", told_meanwhile)
+    monkeypatch.setattr(ModelCache, "_read_all", told_meanwhile)
     cache.has_ended(database, ended)
     assert depths == [0, 1]
 
@@ -179,3 +179,28 @@ def test_a_model_that_cannot_be_renewed_is_not_believed(database: Database, ende
         materials.remove_alias(session, materials.find_id(session, "card"), "paper")
     cache.has_ended(database, ended)
     assert cache.fresh("paper", "ols") is None
+
+
+def test_a_material_of_many_names_is_read_once_a_method_at_the_end_of_a_job(
+    database: Database, ended: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of names that were asked lately. Each was read by itself: 0.4 s of CPU for a hundred aliases by six methods."""
+    cache, names = ModelCache(60.0), [f"paper {number}" for number in range(100)]
+    with database.write() as session:
+        for name in names:
+            materials.add_alias(session, materials.find_id(session, "paper"), name)
+    for name in names:
+        cache.read(database, name, "ols")
+    old = cache.read(database, "paper", "ols")
+    cache._known["paper", "ols"] = replace(old, until=old.read_at - 1.0)
+    queries = list[list[str]]()
+    original = ModelCache._read_all
+
+    def noting(own: ModelCache, stored: Database, asked: list[str], method: str) -> dict[str, KnownModel]:
+        queries.append(asked)
+        return original(own, stored, asked, method)
+
+    monkeypatch.setattr(ModelCache, "_read_all", noting)
+    cache.has_ended(database, ended)
+    assert queries == [names]
+    assert all(cache.fresh(name, "ols") for name in names)
