@@ -79,3 +79,45 @@ def test_a_folder_is_packed_with_its_arrays_alone(tmp_path: Path) -> None:
 def test_a_folder_without_arrays_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidArgument, match="folder is"):
         container.pack_folder(tmp_path)
+
+
+def test_members_stand_in_one_order_and_may_be_read_by_all(log: Any) -> None:
+    with zipfile.ZipFile(io.BytesIO(container.encode(log))) as archive:
+        names = [entry.filename for entry in archive.infolist()]
+        assert {entry.external_attr for entry in archive.infolist()} == {0o644 << 16}
+    told = ["format", "version", "sensor", "metadata", "time", "position", "displacement", "element_area"]
+    assert names[:8] == [f"{name}.npy" for name in told]
+    truth = ["truth_contact", "truth_slip_kinematic", "truth_slip_contact_factor", "truth_stick_ratio"]
+    assert names[-5:] == [f"{name}.npy" for name in (*truth, "truth_friction")]
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "dtype"),
+    [
+        ("contact", [[1, 0]], "bool"),
+        ("observed", [[0, 1]], "bool"),
+        ("gripper_force", np.array([5, 6], dtype=np.float32), "<f8"),
+        ("gripper_force_deviation", 0.5, "<f8"),
+    ],
+)
+def test_what_older_logs_lack_is_written_where_it_is_there(log: Any, name: str, given: Any, dtype: str) -> None:
+    class Newer:
+        def __getattr__(self, asked: str) -> Any:
+            return given if asked == name else getattr(log, asked)
+
+    member = container.members(Newer())[name]
+    assert member.dtype == np.dtype(dtype)
+    np.testing.assert_array_equal(member, given)
+    assert name not in container.members(log) or getattr(log, name) is not None
+
+
+@pytest.mark.parametrize("name", ["time", "position", "element_area", "object_pose", "truth_friction"])
+def test_single_precision_is_doubled_where_the_container_has_none(log: Any, name: str) -> None:
+    assert container.members(log)[name].dtype == np.dtype("<f8")
+
+
+def test_arrays_of_another_order_of_bytes_or_axes_are_turned(log: Any) -> None:
+    other = replace(log, force=np.asfortranarray(np.asarray(log.force).astype(">f4")))
+    member = container.members(other)["force"]
+    assert (member.dtype, member.flags.c_contiguous) == (np.dtype("<f8"), True)
+    np.testing.assert_array_equal(member, other.force)

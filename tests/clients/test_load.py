@@ -1,0 +1,93 @@
+"""What the grip controller makes of a load that changes, frame by frame."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from stiction_client import Contact, ControlSettings, InvalidArgument, Observation
+from stiction_client.controller.load import LoadEstimate, size_of
+
+SETTINGS = ControlSettings(
+    contact=Contact(6e-5),
+    least_force=0.5,
+    most_force=40.0,
+    rate_time=0.03,
+    trend_time=0.15,
+    rate_floor=0.8,
+    trend_floor=0.2,
+    lead_time=0.1,
+    steady_share=0.05,
+    dropout_time=0.1,
+)
+
+
+def seen(time: float, tangential: float, torque: float = 0.0) -> Observation:
+    return Observation(time, 5.0, tangential, torque)
+
+
+def test_a_rate_is_filtered_over_its_time_and_the_trend_over_a_longer_one() -> None:
+    load = LoadEstimate(1.0, rate=2.0, trend=1.0).step(seen(3.0, 1.1), 0.02, SETTINGS)
+    assert load.size == 1.1
+    assert load.rate == pytest.approx(2.0 + (0.1 - 2.0 * 0.02) / 0.05)
+    assert load.trend == pytest.approx(1.0 + (0.1 - 1.0 * 0.02) / 0.17)
+
+
+def test_a_gap_as_long_as_a_dropout_may_be_is_none_and_a_longer_one_forgets_the_rate() -> None:
+    before = LoadEstimate(1.0, rate=2.0, trend=1.0)
+    assert before.step(seen(3.0, 1.2), 0.1, SETTINGS).rate == pytest.approx(2.0)
+    assert before.step(seen(3.0, 1.2), 0.1001, SETTINGS) == LoadEstimate(1.2, steady=3.0)
+    assert before.step(seen(3.0, 1.2), math.inf, SETTINGS) == LoadEstimate(1.2, steady=3.0)
+    assert before.step(seen(3.0, 1.2), math.nan, SETTINGS) == LoadEstimate(1.2, steady=3.0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "trend", "lead"),
+    [
+        (0.8, 0.2, 2.0),
+        (1.8, 0.2, 2.0 + 0.1 * 1.0),
+        (0.8, 0.7, 2.0 + 0.1 * 0.5),
+        (1.8, 0.7, 2.0 + 0.1 * 1.0),
+        (1.0, 0.7, 2.0 + 0.1 * 0.5),
+        (-5.0, -5.0, 2.0),
+    ],
+)
+def test_a_load_leads_by_the_faster_of_rate_and_trend_above_their_noise(rate: float, trend: float, lead: float) -> None:
+    load = LoadEstimate(2.0, rate, trend)
+    assert load.lead(SETTINGS) == pytest.approx(lead)
+    assert load.growth(SETTINGS) == pytest.approx(lead / 2.0)
+
+
+def test_nothing_does_not_grow_by_any_factor() -> None:
+    assert LoadEstimate(0.0, 5.0, 5.0).growth(SETTINGS) == 1.0
+    assert LoadEstimate(0.0, 5.0, 5.0).lead(SETTINGS) == pytest.approx(0.48)
+
+
+def test_a_load_is_steady_since_the_first_frame_from_which_on_it_changed_little() -> None:
+    """The trend, 5 N/s after the first frame, loses a quarter in each: from the eighth on it adds less than 5 %."""
+    load, since = LoadEstimate(), []
+    for frame in range(11):
+        load = load.step(seen(0.05 * frame, 1.0), 0.05, SETTINGS)
+        since.append(load.steady)
+    assert since == [math.inf] * 7 + [0.05 * 7] * 4
+    assert load.step(seen(0.55, 1.5), 0.05, SETTINGS).steady == math.inf
+
+
+@pytest.mark.parametrize(("rate", "steady"), [(1.299, 7.0), (1.301, math.inf)])
+def test_what_changes_within_the_lead_by_its_share_is_steady(rate: float, steady: float) -> None:
+    unfiltered = replace(SETTINGS, rate_time=0.0, trend_time=10.0, trend_floor=1.0)
+    before = LoadEstimate(1.0 - 0.01 * rate)
+    assert before.step(seen(7.0, 1.0), 0.01, unfiltered).steady == steady
+
+
+def test_no_load_is_not_steady() -> None:
+    assert LoadEstimate(steady=1.0).step(seen(2.0, 0.0), 0.02, SETTINGS).steady == math.inf
+
+
+def test_torque_adds_by_its_arm_as_root_of_squares() -> None:
+    round_contact = replace(SETTINGS, contact=Contact.round(6e-5, at_force=5.0))
+    arm = float(round_contact.contact.arm(5.0))
+    assert size_of(seen(0.0, 3.0, 4.0 * arm), round_contact) == pytest.approx(5.0)
+    assert size_of(seen(0.0, 3.0), SETTINGS) == 3.0
+    with pytest.raises(InvalidArgument, match=r"torque is 0\.5; allowed: 0 where the contact has no torque_arm"):
+        size_of(seen(0.0, 3.0, 0.5), SETTINGS)
