@@ -1,0 +1,75 @@
+"""With which exit code and words a command ends by an error."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from db.errors import DatabaseError, NotFound, StorageUnavailable
+from estimators.errors import EstimatorError, TooFewSamples
+from service.cli.exit_codes import (
+    FAILURE,
+    INPUT_REFUSED,
+    INTERRUPTED,
+    NOT_FEASIBLE,
+    SERVICE_REFUSED,
+    exit_code,
+    message,
+)
+from service.domain.keys import NoKeys
+from service.settings import Settings
+from slipcore.errors import InvalidInput, NoForces
+from stiction_client import ConnectionFailed, InvalidArgument, NoFeasibleForce
+from stiction_client.errors import JobError, ProblemError
+
+
+def refused_settings(folder: Path) -> ValidationError:
+    with pytest.raises(ValidationError) as refused:
+        Settings(data=folder, port=-1)
+    return refused.value
+
+
+def test_codes_differ_and_none_says_that_all_is_well() -> None:
+    codes = {FAILURE, INPUT_REFUSED, SERVICE_REFUSED, NOT_FEASIBLE, INTERRUPTED}
+    assert codes == {1, 3, 4, 5, 130}
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (NoFeasibleForce(3.0, 1.0, 2.0, "the limit"), NOT_FEASIBLE),
+        (InvalidArgument("load", -1.0, "0 or more"), INPUT_REFUSED),
+        (ConnectionFailed("nobody listens"), SERVICE_REFUSED),
+        (JobError("1", "no slip"), SERVICE_REFUSED),
+        (ProblemError("/problems/no-model", 404, "no model"), SERVICE_REFUSED),
+        (NotFound("material", "paper"), INPUT_REFUSED),
+        (StorageUnavailable("locked"), INPUT_REFUSED),
+        (DatabaseError("none"), INPUT_REFUSED),
+        (NoKeys("none"), INPUT_REFUSED),
+        (TooFewSamples("samples", 0, "30 or more"), INPUT_REFUSED),
+        (EstimatorError("none"), INPUT_REFUSED),
+        (InvalidInput("time", -1.0, "0 or more"), INPUT_REFUSED),
+        (NoForces("none"), INPUT_REFUSED),
+        (FileNotFoundError("log.npz"), INPUT_REFUSED),
+        (ZeroDivisionError(), None),
+        (ValueError("ours"), None),
+        (KeyError("ours"), None),
+    ],
+)
+def test_an_error_that_a_user_can_act_upon_has_a_code_and_ours_has_none(error: Exception, code: int | None) -> None:
+    assert exit_code(error) == code
+
+
+def test_a_setting_out_of_its_range_is_an_input(tmp_path: Path) -> None:
+    refused = refused_settings(tmp_path)
+    assert exit_code(refused) == INPUT_REFUSED
+    assert "port" in message(refused).lower()
+    assert "pydantic" not in message(refused)
+
+
+def test_what_is_said_of_an_error_is_its_text_and_its_notes_line_by_line() -> None:
+    error = InvalidInput("time", -1.0, "0 or more")
+    assert message(error) == "time is -1.0; allowed: 0 or more"
+    error.add_note("in frame 3")
+    error.add_note("of log.npz")
+    assert message(error) == "time is -1.0; allowed: 0 or more\nin frame 3\nof log.npz"
