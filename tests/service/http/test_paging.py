@@ -1,10 +1,14 @@
 import base64
 import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from fastapi import Request, Response
 
-from service.http.paging import Page
+from db.paging import Window
+from service.http.paging import Page, link_next
 from service.http.problems import Problem
 
 Reach = Any
@@ -80,3 +84,59 @@ def test_a_cursor_that_no_answer_gave_is_refused(sort: str, cursor: str) -> None
 def test_a_wish_that_cannot_be_is_refused_by_name(reach: Reach, query: str, name: str) -> None:
     answer = reach("open").get(f"/v1/materials?{query}")
     assert (answer.status_code, answer.json()["name"]) == (422, name)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Of a list."""
+
+    id: int
+    name: str
+    created_at: datetime
+
+
+ENTRIES = [Entry(number, "cab"[number], datetime(2026, 1, 1 + number, tzinfo=UTC)) for number in range(3)]
+
+
+def test_one_entry_more_than_a_page_shows_that_there_is_another() -> None:
+    assert Page("-name", 2, None).window() == Window("name", descending=True, limit=3)
+    assert Page("name", 3, None).cut(ENTRIES) == (ENTRIES, None)
+    assert Page("name", 3, None).cut([]) == ([], None)
+
+
+@pytest.mark.parametrize(
+    ("sort", "value"),
+    [("name", "a"), ("-name", "a"), ("created_at", ENTRIES[1].created_at), ("-id", 1)],
+)
+def test_a_cursor_leads_on_after_the_last_entry_of_its_page(sort: str, value: object) -> None:
+    shown, cursor = Page(sort, 2, None).cut(ENTRIES)
+    assert shown == ENTRIES[:2]
+    assert cursor is not None
+    window = Page(sort, 5, cursor).window()
+    assert (window.after, window.limit, window.descending) == ((value, 1), 6, sort.startswith("-"))
+
+
+@pytest.mark.parametrize("identity", [0, 2**31 - 1])
+def test_an_id_is_any_of_the_database(identity: int) -> None:
+    assert Page("name", 1, encoded("name", "a", identity)).window().after == ("a", identity)
+
+
+def test_a_moment_of_another_zone_is_the_same_moment() -> None:
+    after = Page("created_at", 1, encoded("created_at", "2026-01-01T02:00:00+02:00", 1)).window().after
+    assert after == (datetime(2026, 1, 1, tzinfo=UTC), 1)
+
+
+def test_the_next_page_is_told_in_a_header_with_all_else_that_was_asked() -> None:
+    scope = {
+        "type": "http",
+        "server": ("a", 80),
+        "path": "/v1/materials",
+        "query_string": b"limit=2&cursor=old",
+        "headers": [],
+    }
+    response = Response()
+    assert link_next(Request(scope), response, "new=") == "new="
+    assert response.headers["link"] == '</v1/materials?limit=2&cursor=new%3D>; rel="next"'
+    last = Response()
+    assert link_next(Request(scope), last, None) is None
+    assert "link" not in last.headers
