@@ -1,19 +1,22 @@
 """What accuracy costs in time: `python -m benchmarks.contact.accuracy [--output FOLDER] [--cells ...] [--scenes ...]`.
 
-Error against processor time over grids and tolerances, for each contact problem with a closed form and for whole
-scenes against a fine run; then what `simulate(scene, accuracy=...)` was asked and what it kept; and the error of load
-steps alone. `--parts steps` measures only the last. Writes JSON and pictures, prints Markdown tables.
+Error against processor time over grids and tolerances, for each contact problem with a closed form (`closed`); of
+whole scenes over grids against a fine run, with what `simulate(scene, accuracy=...)` was asked and what it kept
+(`scenes`); and the error of load steps alone (`steps`). `--parts steps` measures only these. Writes JSON and pictures,
+prints Markdown tables.
 """
 
 import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -23,24 +26,25 @@ from slipcore.contact.effects import LoadPath, SensorSampling, Viscoelasticity
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.plan.plan import Plan
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
 from slipcore.contact.scene import Scene
-from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.normal import NormalContact, solve_normal
 from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.accuracy import difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
-from slipcore.frames import FloatArray
+from slipcore.contact.tiers.fronts import shares_within
+from slipcore.frames import FloatArray, GraspLog
 
 FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
 HERTZ = reference.HertzContact(RADIUS, FORCE, reference.half_space(YOUNG, 0.0))
 SLIDING = FRICTION * FORCE
-WIDTH = 2.1
-"""Of the grid, in contact radii."""
+WIDTHS = (2.1, 2.13, 2.17, 2.2, 2.26)
+"""Of grids, in contact radii: on each, cells lie otherwise on the contact's edge, and single ones scatter by that."""
 TOLERANCES = (1e-2, 1e-4, 1e-7)
-REPEATS = 3
 SCENES = (
     "table1_condition1",
     "table1_condition2",
@@ -49,7 +53,11 @@ SCENES = (
     "table1_condition1_layer",
 )
 ASKED = (0.1, 0.05, 0.02)
-FINE = Fidelity(cells=110, substeps=2, tolerance=1e-6)
+CELLS = (12, 17, 24, 34, 48, 68, 96)
+"""Across the contact of a scene, a factor of √2 apart, on grids of any pitch: on those that are aligned with the sensor
+two of these may be one.
+"""
+FINE = Fidelity(cells=180, substeps=2, tolerance=1e-6, aligned=False)
 CREEPING = Scene(
     "creeping pull",
     (
@@ -64,14 +72,14 @@ STEPPED = ("table1_condition1_layer", "bottle_cap_twist", "cup_filling", "liftin
 STEPS = (1, 2, 4, 8)
 FINEST_STEPS = 32
 """Load steps a frame that those of ``STEPS`` are compared with, on the same grid."""
-PARTS = ("cells", "steps")
+PARTS = ("closed", "scenes", "steps")
 
-Errors = Callable[[int, float], float]
+Errors = Callable[[Grid, float], float]
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One run: cells across the grid (of a scene: across the contact), tolerance, error, median processor seconds."""
+    """One run: cells across the grid, tolerance, error, median processor seconds."""
 
     case: str
     cells: int
@@ -92,12 +100,14 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
-class Stepped:
-    """What load steps alone leave of error in a scene: ``substeps`` a frame, ``steps`` in all, the largest absolute
-    error of the stick ratio and its mean over time, relative L2 of displacement and force, processor seconds.
+class SceneRun:
+    """A scene against a finer run of it: ``cells`` across the contact, ``substeps`` a frame, ``steps`` in all, the
+    largest absolute error of the stick ratio and its mean over time, relative L2 of displacement and force, processor
+    seconds.
     """
 
     scene: str
+    cells: int
     substeps: int
     steps: int
     stick_ratio: float
@@ -107,14 +117,17 @@ class Stepped:
     seconds: float
 
 
+MEASURES = ("displacement", "force", "mean_stick_ratio")
+
+
 def relative(values: FloatArray, exact: FloatArray) -> float:
     """Relative L2 difference."""
     return float(np.sqrt(((values - exact) ** 2).sum() / (exact**2).sum()))
 
 
-def hertz_grid(cells: int) -> Grid:
-    """Grid around the contact."""
-    return Grid.square(cells, WIDTH * HERTZ.contact_radius)
+def hertz_grid(cells: int, width: float) -> Grid:
+    """Grid around the contact, ``width`` contact radii wide."""
+    return Grid.square(cells, width * HERTZ.contact_radius)
 
 
 def sphere(poisson: float, *, coupled: bool = False) -> ContactProblem:
@@ -128,51 +141,57 @@ def shear(along_x: float, moment: float = 0.0) -> StepLoad:
     return StepLoad(FORCE, tangential=np.array([along_x, 0.0, moment]))
 
 
-def stepped(problem: ContactProblem, cells: int, tolerance: float, loads: list[StepLoad]) -> list[StepResult]:
-    """Results of loads on a grid of that many cells a side."""
-    grid = hertz_grid(cells)
+def stepped(problem: ContactProblem, grid: Grid, tolerance: float, loads: list[StepLoad]) -> list[StepResult]:
+    """Results of loads on a grid."""
     return list(QuasiStatic(problem, grid, tolerance, 1e-2 * tolerance).run(loads))
 
 
 # Cases with a closed form: error of one run
 
 
-def hertz(cells: int, tolerance: float) -> float:
+def hertz(grid: Grid, tolerance: float) -> float:
     """Pressure of a sphere."""
-    grid = hertz_grid(cells)
+    solved = _hertz(grid, tolerance)
+    return relative(solved.pressure, HERTZ.pressure(np.hypot(*grid.points())))
+
+
+def _hertz(grid: Grid, tolerance: float) -> NormalContact:
     x, y = grid.points()
     height = (x**2 + y**2) / (2.0 * RADIUS)
     operators = Operators((HalfSpace.from_young(YOUNG, 0.0),))
-    solved = solve_normal(operators, grid, height, force=FORCE, tolerance=tolerance)
-    return relative(solved.pressure, HERTZ.pressure(np.hypot(x, y)))
+    return solve_normal(operators, grid, height, force=FORCE, tolerance=tolerance)
 
 
-def cattaneo_mindlin(cells: int, tolerance: float) -> float:
+def contact_area(grid: Grid, tolerance: float) -> float:
+    """Area within the front of a sphere's pressure."""
+    solved = _hertz(grid, tolerance)
+    found = shares_within(solved.pressure**2, solved.pressure > 0.0).sum() * grid.cell_area
+    return float(abs(found / (np.pi * HERTZ.contact_radius**2) - 1.0))
+
+
+def cattaneo_mindlin(grid: Grid, tolerance: float) -> float:
     """Traction at F_T = 0.7 μF_N, ν = 0."""
-    last = stepped(sphere(0.0), cells, tolerance, [shear(0.0), shear(0.7 * SLIDING)])[-1]
-    grid = hertz_grid(cells)
+    last = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.7 * SLIDING)])[-1]
     exact = reference.CattaneoMindlin(HERTZ, FRICTION, 0.7 * SLIDING).traction(np.hypot(*grid.points()))
     return relative(last.force[0] / grid.cell_area, exact)
 
 
-def reversal(cells: int, tolerance: float) -> float:
+def reversal(grid: Grid, tolerance: float) -> float:
     """Traction on a loop between ±0.9 μF_N, ν = 0; the largest error, of the traction at the peak."""
     forces = SLIDING * np.array([0.0, 0.5, 0.9, 0.4, 0.0, -0.5, -0.9, -0.3, 0.5, 0.9])
-    grid = hertz_grid(cells)
     r = np.hypot(*grid.points())
     exact, errors = MindlinDeresiewicz(HERTZ, FRICTION), []
     peak = np.sqrt((exact.load(FORCE, 0.9 * SLIDING).traction(r) ** 2).sum())
-    for force, result in zip(forces, stepped(sphere(0.0), cells, tolerance, [shear(f) for f in forces]), strict=True):
+    for force, result in zip(forces, stepped(sphere(0.0), grid, tolerance, [shear(f) for f in forces]), strict=True):
         exact = exact.load(FORCE, float(force))
         errors.append(np.sqrt(((result.force[0] / grid.cell_area - exact.traction(r)) ** 2).sum()) / peak)
     return float(max(errors))
 
 
-def torsion(cells: int, tolerance: float) -> float:
+def torsion(grid: Grid, tolerance: float) -> float:
     """Traction at 0.6 of the sliding moment."""
     moment = 0.6 * sliding_moment(HERTZ, FRICTION)
-    last = stepped(sphere(0.0), cells, tolerance, [shear(0.0), shear(0.0, moment)])[-1]
-    grid = hertz_grid(cells)
+    last = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.0, moment)])[-1]
     x, y = grid.points()
     r = np.hypot(x, y)
     around = (x * last.force[1] - y * last.force[0]) / (np.where(r > 0.0, r, 1.0) * grid.cell_area)
@@ -181,6 +200,7 @@ def torsion(cells: int, tolerance: float) -> float:
 
 CLOSED: dict[str, Errors] = {
     "Hertz": hertz,
+    "Hertz, contact area": contact_area,
     "Cattaneo–Mindlin": cattaneo_mindlin,
     "unloading and reversal": reversal,
     "torsion": torsion,
@@ -190,45 +210,49 @@ CLOSED: dict[str, Errors] = {
 def coupled_reference(cells: int) -> Errors:
     """Forces of a coupled contact at ν = 0.2 against a run on a grid of ``cells``, both summed over 16² elements."""
 
-    def forces(count: int, tolerance: float) -> FloatArray:
+    def forces(grid: Grid, tolerance: float) -> FloatArray:
         loads = [shear(0.0), *(shear(share * SLIDING) for share in (0.25, 0.5, 0.75))]
-        last = stepped(sphere(0.2, coupled=True), count, tolerance, loads)[-1].force
-        return last.reshape(3, 16, count // 16, 16, count // 16).sum(axis=(2, 4))
+        last, part = stepped(sphere(0.2, coupled=True), grid, tolerance, loads)[-1].force, grid.shape[0] // 16
+        return last.reshape(3, 16, part, 16, part).sum(axis=(2, 4))
 
-    fine = forces(cells, 1e-7)
-    return lambda count, tolerance: relative(forces(count, tolerance), fine)
+    @cache
+    def fine(width: float) -> FloatArray:
+        return forces(Grid.square(cells, width), 1e-7)
+
+    return lambda grid, tolerance: relative(forces(grid, tolerance), fine(grid.shape[0] * grid.pitch[0]))
 
 
 def timed(errors: Errors, cells: int, tolerance: float) -> tuple[float, float]:
-    """Error and median processor seconds, set-up of operators included."""
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        error = errors(cells, tolerance)
+    """Root mean square of the errors on grids of all widths, and median processor seconds of one, set-up of operators
+    included.
+    """
+    found, seconds = [], []
+    for width in WIDTHS:
+        grid, began = hertz_grid(cells, width), time.process_time()
+        found.append(errors(grid, tolerance))
         seconds.append(time.process_time() - began)
-    return error, statistics.median(seconds)
+    return float(np.sqrt(np.mean(np.square(found)))), statistics.median(seconds)
 
 
-def closed_forms(grids: list[int]) -> Iterator[Point]:
+def closed_forms(cells: list[int]) -> Iterator[Point]:
     """All cases with a closed form, and the coupled one, over grids and tolerances."""
     cases = CLOSED | {"coupled, against 192²": coupled_reference(192)}
     for name, errors in cases.items():
-        errors(grids[0], TOLERANCES[0])  # compilation
-        for cells in grids:
+        for width in WIDTHS:  # compilation, and what a finer run is compared with
+            errors(hertz_grid(cells[0], width), TOLERANCES[0])
+        for count in cells:
             for tolerance in TOLERANCES:
-                yield Point(name, cells, tolerance, *timed(errors, cells, tolerance))
+                yield Point(name, count, tolerance, *timed(errors, count, tolerance))
         print(f"{name}: done", flush=True)
 
 
-def scenes(names: list[str]) -> Iterator[Point | Kept]:
-    """Whole scenes against a fine run, then on request."""
+def scenes(names: list[str]) -> Iterator[SceneRun | Kept]:
+    """Whole scenes over grids against a fine run, then on request."""
     for name in names:
-        plan = Scene.from_toml(name).plan()
+        plan = plan_of(name)
         fine = run(plan, FINE)
-        for cells in (12, 20, 40, 60):
-            began = time.process_time()
-            log = run(plan, Fidelity(cells))
-            yield Point(name, cells, 1e-4, difference(log, fine).largest, time.process_time() - began)
+        for cells in CELLS:
+            yield scene_run(name, plan, Fidelity(cells, aligned=False), fine)
         for asked in ASKED:
             began = time.process_time()
             found = simulate_to(plan, accuracy=asked)
@@ -237,64 +261,94 @@ def scenes(names: list[str]) -> Iterator[Point | Kept]:
         print(f"{name}: done", flush=True)
 
 
-def load_steps(names: list[str]) -> Iterator[Stepped]:
+def load_steps(names: list[str]) -> Iterator[SceneRun]:
     """Scenes on the default grid in ever more load steps, against the finest."""
     for name in names:
-        plan = (CREEPING if name == CREEPING.name else Scene.from_toml(name)).plan()
+        plan = plan_of(name)
         fine = run(plan, Fidelity(substeps=FINEST_STEPS, tolerance=1e-5))
         for substeps in STEPS:
-            began = time.process_time()
-            log = run(plan, Fidelity(substeps=substeps))
-            seconds, error = time.process_time() - began, difference(log, fine)
-            assert log.truth is not None
-            assert fine.truth is not None
-            mean = float(np.nanmean(np.abs(log.truth.stick_ratio - fine.truth.stick_ratio)))
-            steps = int(log.metadata["steps"])
-            yield Stepped(name, substeps, steps, error.stick_ratio, mean, error.displacement, error.force, seconds)
+            yield scene_run(name, plan, Fidelity(substeps=substeps), fine)
         print(f"{name}: steps done", flush=True)
 
 
-def step_curves(stepped: list[Stepped]) -> Figure:
+def plan_of(name: str) -> Plan:
+    """That of a scene of the library, or of the one that creeps."""
+    return (CREEPING if name == CREEPING.name else Scene.from_toml(name)).plan()
+
+
+def scene_run(name: str, plan: Plan, fidelity: Fidelity, fine: GraspLog) -> SceneRun:
+    """Run a scene, and hold it against a finer run."""
+    began = time.process_time()
+    log = run(plan, fidelity)
+    seconds, error = time.process_time() - began, difference(log, fine)
+    assert log.truth is not None
+    assert fine.truth is not None
+    mean = float(np.nanmean(np.abs(log.truth.stick_ratio - fine.truth.stick_ratio)))
+    errors = (error.stick_ratio, mean, error.displacement, error.force)
+    return SceneRun(name, fidelity.cells, fidelity.substeps, int(log.metadata["steps"]), *errors, seconds)
+
+
+def step_curves(stepped: list[SceneRun]) -> Figure:
     """Error of load steps against their number, with lines of first and second order."""
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
     panels = figure.subplots(1, 2)
+    first = [entry for entry in stepped if entry.scene == stepped[0].scene]
     for axes, measure in zip(panels, ("displacement", "mean_stick_ratio"), strict=True):
-        for name in dict.fromkeys(entry.scene for entry in stepped):
-            own = [entry for entry in stepped if entry.scene == name]
-            axes.loglog([e.steps for e in own], [getattr(e, measure) or np.nan for e in own], "o-", ms=4, label=name)
-        first = [entry for entry in stepped if entry.scene == stepped[0].scene]
+        _draw(axes, stepped, measure, "steps")
         for order, style in ((1, ":"), (2, "--")):
             falls = [getattr(first[0], measure) * (first[0].steps / entry.steps) ** order for entry in first]
             axes.loglog([entry.steps for entry in first], falls, style, color="0.5", label=f"order {order}")
-        axes.set(title=measure.replace("_", " "), xlabel="load steps", ylabel="error")
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.grid(visible=True, which="both", alpha=0.3)
+        axes.set(xlabel="load steps")
     panels[0].legend(fontsize=8)
     return figure
 
 
-def step_table(stepped: list[Stepped]) -> str:
-    """Errors of load steps and times."""
+def scene_curves(found: list[SceneRun]) -> Figure:
+    """Errors of scenes against time, by what is measured; the numbers are cells across the contact."""
+    figure = Figure(figsize=(13.0, 4.2), layout="constrained")
+    panels = figure.subplots(1, 3)
+    for axes, measure in zip(panels, MEASURES, strict=True):
+        _draw(axes, found, measure, "seconds")
+        for entry in found:
+            if entry.scene in (found[0].scene, found[-1].scene):
+                at = (entry.seconds, getattr(entry, measure))
+                axes.annotate(str(entry.cells), at, textcoords="offset points", xytext=(4, 4), fontsize=7)
+        axes.set(xlabel="processor time, s")
+    panels[0].legend(fontsize=8)
+    return figure
+
+
+def _draw(axes: Axes, found: list[SceneRun], measure: str, against: str) -> None:
+    for name in dict.fromkeys(entry.scene for entry in found):
+        own = [entry for entry in found if entry.scene == name]
+        places, errors = [getattr(e, against) for e in own], [getattr(e, measure) or np.nan for e in own]
+        axes.loglog(places, errors, "o-", ms=4, label=name)
+    axes.set(title=measure.replace("_", " "), ylabel="error")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.grid(visible=True, which="both", alpha=0.3)
+
+
+def run_table(found: list[SceneRun], over: str) -> str:
+    """Errors and times of scenes ``over`` cells or steps."""
     lines = [
-        "| scene | steps | stick ratio | its mean | displacement | force | seconds |",
+        f"| scene | {over} | stick ratio | its mean | displacement | force | seconds |",
         "|---|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {e.scene} | {e.steps} | {e.stick_ratio:.4f} | {e.mean_stick_ratio:.5f} | {e.displacement:.1e} "
+        f"| {e.scene} | {getattr(e, over)} | {e.stick_ratio:.4f} | {e.mean_stick_ratio:.5f} | {e.displacement:.1e} "
         f"| {e.force:.1e} | {e.seconds:.2f} |"
-        for e in stepped
+        for e in found
     ]
     return "\n".join(lines)
 
 
-def order_table(stepped: list[Stepped]) -> str:
-    """Orders in load steps between the first and the last row of each scene; none where nothing is left."""
-    measures = ("displacement", "force", "mean_stick_ratio")
+def order_table(found: list[SceneRun], over: str) -> str:
+    """Orders in cells or steps between the first and the last row of each scene; none where nothing is left."""
     lines = ["| scene | displacement | force | mean of the stick ratio |", "|---|---|---|---|"]
-    for name in dict.fromkeys(entry.scene for entry in stepped):
-        own = [entry for entry in stepped if entry.scene == name]
-        growth, told = np.log(own[-1].steps / own[0].steps), []
-        for measure in measures:
+    for name in dict.fromkeys(entry.scene for entry in found):
+        own = [entry for entry in found if entry.scene == name]
+        growth, told = np.log(getattr(own[-1], over) / getattr(own[0], over)), []
+        for measure in MEASURES:
             first, last = getattr(own[0], measure), getattr(own[-1], measure)
             told.append(f"{np.log(first / last) / growth:.2f}" if last > 0.0 else "")
         lines.append(f"| {name} | " + " | ".join(told) + " |")
@@ -350,26 +404,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64, 128])
-    parser.add_argument("--scenes", nargs="*", default=list(SCENES), help="the layered one takes minutes")
+    parser.add_argument("--scenes", nargs="*", default=list(SCENES), help="of the library")
     parser.add_argument("--stepped", nargs="+", choices=STEPPED, default=list(STEPPED), help="scenes of load steps")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="what to measure")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    if "cells" in options.parts:
-        measured = [*closed_forms(options.cells), *scenes(options.scenes)]
-        points = [entry for entry in measured if isinstance(entry, Point)]
+    output = options.output
+    if "closed" in options.parts:
+        points = list(closed_forms(options.cells))
+        save(curves(points), output / "contact_accuracy.png")
+        report(output / "contact_accuracy.json", points, table(points))
+    if "scenes" in options.parts:
+        measured = list(scenes(options.scenes))
+        found = [entry for entry in measured if isinstance(entry, SceneRun)]
         kept = [entry for entry in measured if isinstance(entry, Kept)]
-        records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
-        (options.output / "contact_accuracy.json").write_text(json.dumps(records, indent=1))
-        save(curves(points), options.output / "contact_accuracy.png")
-        print(table(points), request_table(kept), sep="\n\n")
+        save(scene_curves(found), output / "contact_accuracy_scenes.png")
+        report(output / "contact_accuracy_scenes.json", found, run_table(found, "cells"), order_table(found, "cells"))
+        report(output / "contact_accuracy_requests.json", kept, request_table(kept))
     if "steps" in options.parts:
         stepped = list(load_steps(options.stepped))
-        (options.output / "contact_accuracy_steps.json").write_text(
-            json.dumps([asdict(entry) for entry in stepped], indent=1)
+        save(step_curves(stepped), output / "contact_accuracy_steps.png")
+        report(
+            output / "contact_accuracy_steps.json", stepped, run_table(stepped, "steps"), order_table(stepped, "steps")
         )
-        save(step_curves(stepped), options.output / "contact_accuracy_steps.png")
-        print(step_table(stepped), order_table(stepped), sep="\n\n")
+
+
+def report(path: Path, entries: Sequence[Point | SceneRun | Kept], *tables: str) -> None:
+    """Write what was measured as JSON, and print its tables."""
+    path.write_text(json.dumps([asdict(entry) for entry in entries], indent=1))
+    print(*tables, sep="\n\n", end="\n\n")
 
 
 if __name__ == "__main__":
