@@ -171,10 +171,10 @@ class SufficientStatistics:
         n, weight, square, area, *values = NUMBERS.unpack(numbers)
         triangle = np.zeros((3, 3))
         triangle[UPPER] = values[7:]
-        if not (np.isfinite([n, weight, square, area, *values[:3], *values[7:]]).all() and weight >= 0.0 and n >= 0.0):
-            raise InvalidSamples(
-                "moments", "not finite or negative", "finite numbers, counts and weights of at least 0"
-            )
+        is_finite = np.isfinite([n, weight, square, area, *values[:3], *values[7:]]).all()
+        if not (is_finite and min(n, weight, square) >= 0.0 and area > 0.0):
+            allowed = "finite numbers, counts and weights of at least 0, and an element area above 0 m²"
+            raise InvalidSamples("moments", "not finite or negative", allowed)
         factor = Factor(weight, np.array(values[:3]), triangle)
         domain = Domain((values[3], values[4]), (values[5], values[6]))
         unknown, rest = _read_unknown(rest) if magic == WITH_UNKNOWN else ((0.0, 0.0), rest)

@@ -43,9 +43,9 @@ def test_a_step_is_as_two_halves_of_it() -> None:
 def test_what_is_recalled_and_what_is_softer_add_up_to_the_step() -> None:
     """At its end the surface has moved by e + Σ w: by what is recalled, and by the compliance times e."""
     branches, creep = [BRANCH, FAST], [field(0.2), field(0.05)]
-    recalled = creep_recalled(branches, creep, field(1.0), 0.3)
+    recalled = creep_recalled(branches, creep, field(1.5), 0.3)
     assert recalled is not None
-    after = creep_step(branches, creep, field(1.0), field(4.0), 0.3)
+    after = creep_step(branches, creep, field(1.5), field(4.0), 0.3)
     np.testing.assert_allclose(recalled + 4.0 * creep_compliance(branches, 0.3), 4.0 + after[0] + after[1], rtol=1e-12)
 
 
