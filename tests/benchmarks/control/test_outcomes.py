@@ -15,9 +15,7 @@ def episode(normal: list[list[float]], least: list[list[float]], **changed: Any)
     nothing = np.zeros_like(force)
     columns: dict[str, Any] = {"slipped": nothing, "limit": math.inf} | changed
     time = FRAME * np.arange(1, len(force) + 1)
-    return Episode(
-        "task", columns["limit"], time, force, force, np.array(least), nothing, nothing, columns["slipped"]
-    )
+    return Episode("task", columns["limit"], time, force, force, np.array(least), nothing, nothing, columns["slipped"])
 
 
 def outcome(**changed: Any) -> Outcome:

@@ -86,10 +86,9 @@ def robot(monkeypatch: pytest.MonkeyPatch, told: list[float]) -> tuple[int, floa
     """What a robot needs whose fits tell these, one after the other, over what is true."""
     truth, answers = material(0.0, 0.0, 0.0).conservative(), iter(told)
 
-    def fit(data: list[Any], **_: Any) -> Any:
+    def fit(_: list[Any], **__: Any) -> Any:
         ratio = next(answers)
-        assert len(data) >= 1
-        return SimpleNamespace(predict=lambda v, f_n, *_, **__: ratio * truth)
+        return SimpleNamespace(predict=lambda *_, **__: ratio * truth)
 
     monkeypatch.setattr(next_grasp.estimators, "fit", fit)
     return needed(material(0.0, 0.0, 0.0), lambda _, count: (0.1, 1e-3 * (1 + count), 2e-3), 1)
