@@ -22,11 +22,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from itertools import groupby
 from pathlib import Path
 from types import CodeType, FunctionType, SimpleNamespace
-from typing import Any
+from typing import Any, TextIO
 
 import pytest
 
@@ -123,6 +123,7 @@ class Suite:
 
 def main() -> None:
     """Answer requests until there are no more."""
+    _output()
     if sys.argv[1:] == ["--collected"]:
         _serve_collected()
         return
@@ -142,11 +143,14 @@ def _serve_collected() -> None:
     pytest.main([*SHARED, "-s", "-p", "no:cov", "-m", "not long", "tests"], plugins=[Suite(seen)])
 
 
-OUTPUT = os.fdopen(os.dup(1), "w")
+@cache
+def _output() -> TextIO:
+    """Where answers go, wherever what is printed goes by then."""
+    return os.fdopen(os.dup(1), "w")
 
 
 def _say(answer: Any) -> None:
-    print(json.dumps(answer), file=OUTPUT, flush=True)
+    print(json.dumps(answer), file=_output(), flush=True)
 
 
 def _names(item: pytest.Item) -> list[str]:
