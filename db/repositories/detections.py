@@ -206,8 +206,9 @@ def any_samples(session: Session, material_id: int) -> bool:
     return session.scalar(query) is not None
 
 
-def least_frictions(session: Session, material_id: int) -> list[tuple[float, tuple[str, ...]]]:
-    """What friction is at least by the load that the contact of each of a material's logs bore, and the log's findings.
+def least_frictions(session: Session, material_id: int, most: int) -> list[tuple[float, tuple[str, ...]]]:
+    """What friction is at least by the load that the contact of each of a material's newest logs bore, ``most`` of them
+    at most, and the log's findings.
 
     Withdrawn logs, and those that an older version did not look for findings in, are left out.
     """
@@ -215,6 +216,8 @@ def least_frictions(session: Session, material_id: int) -> list[tuple[float, tup
         select(DetectionRow.contact_friction, DetectionRow.findings)
         .join(GraspLogRow, GraspLogRow.id == DetectionRow.grasp_log_id)
         .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
+        .order_by(*_NEWEST_FIRST)
+        .limit(most)
     )
     known = [(found, against) for found, against in session.execute(query) if found and against is not None]
     return [(float(found["low"]), tuple(each["name"] for each in against)) for found, against in known]

@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 MOST = 10_000
 """Models kept, each about 2 kB; when there are more, all are read anew."""
 
+MOST_BOUNDS = 20
+"""Newest logs of a material by which friction is bounded where there is no model: of thousands it would take a second,
+each time that somebody asks.
+"""
+
 MOST_CHANGES = 2_000
 """Changes remembered, 270 bytes each, more than a page lists at once; one that was forgotten is taken for a new one,
 which costs a look at the database."""
@@ -220,7 +225,7 @@ def _chosen(session: Session, material: str, material_id: int, models: Sequence[
 
 def _bound(session: Session, material_id: int) -> str:
     """What is known without a model, if anything: by logs that nothing speaks against."""
-    bounds = detections.least_frictions(session, material_id)
+    bounds = detections.least_frictions(session, material_id, MOST_BOUNDS)
     sound = [least for least, names in bounds if all(severity_of(name) != "warning" for name in names)]
     least = max(sound, default=0.0)
     if least <= 0.0:

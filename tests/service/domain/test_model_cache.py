@@ -11,9 +11,10 @@ import pytest
 from db.database import Database
 from db.errors import NotFound
 from db.paging import Window
-from db.records import Job
-from db.repositories import jobs, materials
+from db.records import ContactFriction, Detection, Job, NewGraspLog, SampleSummary
+from db.repositories import detections, grasp_logs, jobs, materials
 from service.domain import model_cache
+from service.domain.errors import NoModel
 from service.domain.model_cache import KnownModel, ModelCache
 
 pytestmark = [
@@ -204,3 +205,20 @@ def test_a_material_of_many_names_is_read_once_a_method_at_the_end_of_a_job(
     cache.has_ended(database, ended)
     assert queries == [names]
     assert all(cache.fresh(name, "ols") for name in names)
+
+
+def test_without_a_model_few_logs_are_read_for_a_bound_of_friction(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 8,000 logs each such look-up took a second of the server, and all others waited for it."""
+    monkeypatch.setattr(model_cache, "MOST_BOUNDS", 2)
+    none = SampleSummary(0, "no slip", 1e-6, None, None, None, "2" * 64)
+    with database.write() as session:
+        material_id = materials.create(session, "held", "").id
+        for number, low in enumerate([0.5, 0.2, 0.3]):
+            log = NewGraspLog(f"{number:064x}", 1, "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
+            contact = ContactFriction(low, low, None, is_bound=True, reason="held")
+            detection = Detection("filter", None, None, 0, 0, 0, 0, 0, 0, 0.1, "0" * 64, (), contact)
+            detections.add(session, grasp_logs.add(session, log), detection, none)
+    with pytest.raises(NoModel, match=r"best friction was at least 0\.3,"):
+        ModelCache().read(database, "held", "ols")
