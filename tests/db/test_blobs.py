@@ -1,5 +1,6 @@
 import hashlib
 import os
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -230,3 +231,87 @@ def test_a_store_makes_its_folder_and_finds_it_again(tmp_path: Path) -> None:
     assert folder in made
     BlobStore(folder)
     assert {path for path in tmp_path.rglob("*") if path.is_dir()} == made
+
+
+def hash_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def test_what_another_wrote_is_taken_as_it_is(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "store")
+    with store.spool() as spool:
+        spool.path.write_bytes(b"but this one")
+        spool.adopt()
+        assert (spool.size, spool.keep()) == (12, hash_of(b"but this one"))
+    assert store.path(hash_of(b"but this one")).read_bytes() == b"but this one"
+
+
+def test_a_copy_of_a_file_has_the_hash_that_it_must_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("db.blobs.COPY_BYTES", 3)
+    store, file = BlobStore(tmp_path / "store"), tmp_path / "file"
+    file.write_bytes(b"12345678")
+    store.take(file, hash_of(b"12345678"))
+    assert store.path(hash_of(b"12345678")).read_bytes() == file.read_bytes() == b"12345678"
+    with pytest.raises(BlobDamaged) as damaged:
+        store.take(file, hash_of(b"1234"))
+    assert (damaged.value.sha256, damaged.value.found) == (hash_of(b"1234"), hash_of(b"12345678"))
+    assert not store.has(hash_of(b"1234"))
+    assert list(store.disk.iterdir()) == []
+
+
+def test_blobs_stored_before_a_moment_are_told(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "store")
+    hashes = [store.put(bytes([number])) for number in range(3)]
+    for sha256, seconds in zip(hashes, (100, 200, 300), strict=True):
+        os.utime(store.locate(sha256), (seconds, seconds))
+    for moment, count in ((100, 0), (101, 1), (200, 1), (300.5, 3)):
+        assert set(store.hashes(datetime.fromtimestamp(moment, UTC))) == set(hashes[:count])
+    assert set(store.hashes()) == set(hashes)
+    assert list(store.hashes_under(hashes[0][:2])) == hashes[:1]
+
+
+def test_only_those_that_are_named_are_removed(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "store")
+    hashes = [store.put(bytes([number])) for number in range(3)]
+    store.remove(iter([hashes[1], "f" * 64]))
+    assert [store.has(sha256) for sha256 in hashes] == [True, False, True]
+
+
+@pytest.mark.parametrize("within", ["blobs", "spool", "quarantine", "blobs/ab"])
+def test_a_folder_among_the_store_s_own_is_known_by_any_name(tmp_path: Path, within: str) -> None:
+    store = BlobStore(tmp_path / "store")
+    (tmp_path / "link").symlink_to(tmp_path / "store")
+    for folder in (tmp_path / "store" / within, tmp_path / "link" / within):
+        assert store.has_within(folder)
+    assert not store.has_within(tmp_path / "other")
+    assert not store.has_within(tmp_path / "storeroom" / within)
+
+
+def test_a_folder_whose_blobs_are_the_store_s_or_have_them_is_not_another(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "blobs" / "store")
+    assert store.has_within(tmp_path / "blobs" / "store")
+    assert store.has_within(tmp_path)  # whose own blobs have the store among them
+    for folder, is_within in ((tmp_path, True), (tmp_path / "blobs", True), (tmp_path / "other", False)):
+        assert store.is_within(folder) is is_within
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_a_store_is_settled_once_its_database_says_so_too(tmp_path: Path, settled: bool) -> None:
+    store = BlobStore(tmp_path / "store")
+    assert (store.read_store_id(), store.is_settled, store.cached_store_id()) == (None, False, None)
+    store.write_store_id("1" * 32, settled=settled)
+    assert (store.read_store_id(), store.is_settled, store.cached_store_id()) == ("1" * 32, settled, None)
+    assert (tmp_path / "store" / "blobs" / "store-id").read_text().endswith(f"{'1' * 32}\n")
+    assert list(store.disk.iterdir()) == []
+
+
+def test_the_files_of_another_store_in_its_place_are_not_taken(tmp_path: Path) -> None:
+    store = BlobStore(tmp_path / "store")
+    store.write_store_id("2" * 32)
+    store.store_id = "1" * 32
+    told = f"its store id was {'1' * 32} and is {'2' * 32}; is its disk there"
+    for act in (store.ping, lambda: store.remove([]), lambda: store.put(b"a"), lambda: store.locate("f" * 64)):
+        with pytest.raises(StorageUnavailable, match=told):
+            act()
+    store.store_id = "2" * 32
+    store.ping()

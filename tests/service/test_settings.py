@@ -175,3 +175,53 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
         "STICTION_WEBHOOK_URL is not one that is allowed; allowed: an http or https URL, such as"
     )
     assert not {"hush", "hu℀sh"} & set(re.findall(r"[^\W_]+", "".join(lines)))
+
+
+@pytest.mark.parametrize("text", ["", "10.0.0.7", "10.0.0.7, 10.1.0.0/16", "::1,", "fd00::/8"])
+def test_proxies_are_addresses_or_networks(text: str) -> None:
+    assert Settings(trusted_proxies=text).trusted_proxies == text
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("trusted_proxies", "proxy", "proxy is no address; allowed: such as 10.0.0.7,10.1.0.0/16"),
+        ("trusted_proxies", "10.0.0.1,10.1.0.0/99", "10.1.0.0/99 is no address"),
+        ("database_url", "sqlite://", "a database in memory is not seen by the worker processes"),
+        ("database_url", "sqlite:///", "a file or a server"),
+        ("database_url", "sqlite:///:memory:", "a file or a server"),
+        ("webhook_url", "ftp://hooks.example", "an http or https URL"),
+        ("webhook_url", "https://", "an http or https URL"),
+        ("webhook_url", "https://hooks.example:0/a", "an http or https URL"),
+        ("webhook_url", "https://hooks.example:99999/a", "an http or https URL"),
+        ("blob_url", "bucket", "s3://bucket/prefix and other URLs of obstore"),
+        ("blob_url", "memory:///", "s3://bucket/prefix and other URLs of obstore"),
+    ],
+)
+def test_an_address_that_cannot_be_is_refused_with_what_may_be(name: str, value: str, allowed: str) -> None:
+    with pytest.raises(ValidationError) as refused:
+        Settings(**{name: value})
+    told = complaints(refused.value)
+    assert told.startswith(f"STICTION_{name.upper()} is ")
+    assert allowed in told
+    assert told.endswith("(docs/settings.md)")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("webhook_url", "http://hooks.example"),
+        ("webhook_url", "https://hooks.example:8443/a?b"),
+        ("blob_url", "s3://bucket/prefix"),
+        ("database_url", "sqlite:////data/a.sqlite3"),
+        ("database_url", "postgresql://host/stiction"),
+    ],
+)
+def test_an_address_is_kept_as_it_was_given(name: str, value: str) -> None:
+    assert getattr(Settings(**{name: value}), name) == value
+
+
+def test_of_a_long_value_a_hundred_characters_are_told() -> None:
+    with pytest.raises(ValidationError) as refused:
+        Settings(trusted_proxies="x" * 1000)
+    assert f"STICTION_TRUSTED_PROXIES is {repr('x' * 1000)[:100]}; allowed: " in complaints(refused.value)

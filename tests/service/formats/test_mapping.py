@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,8 @@ import pytest
 
 from service import formats
 from service.formats import assemble, mapping
-from service.formats.mapping import Origin, parse
-from service.formats.members import MARKS
+from service.formats.mapping import UNMAPPED, Origin, chosen_over, default_origins, parse
+from service.formats.members import DTYPES, MARKS
 from slipcore import InvalidInput
 
 
@@ -164,3 +165,123 @@ def test_an_entry_of_another_kind_of_format_is_refused_by_name(name: str, entry:
     formats.check_settings(name, {"mapping": json.dumps(entries)})
     with pytest.raises(InvalidInput, match=f"mapping {entry} is .* with {name}; allowed: only for"):
         formats.check_settings(name, {"mapping": json.dumps(entries | {entry: value})})
+
+
+@pytest.mark.parametrize(
+    ("moved", "at", "are_places"),
+    [
+        ("p", "p", True),
+        (["x", "y"], ["x", "y"], True),
+        ({"field": "p", "topic": "/a"}, {"field": "p", "topic": "/a"}, True),
+        ({"field": "p", "topic": "/a"}, {"field": "p", "topic": "/b"}, False),
+        (["x", "y"], ["y", "x"], False),
+        ("d", "p", False),
+        ({"value": [0.0]}, {"value": [0.0]}, False),
+    ],
+)
+def test_displacement_and_position_of_the_same_fields_are_places(moved: Any, at: Any, are_places: bool) -> None:
+    assert parsed(displacement=moved, position=at).is_of_places is are_places
+    assert not parsed(position=at).is_of_places
+    assert not parsed().is_of_places
+
+
+def test_another_rest_is_that_of_all_alternatives() -> None:
+    first, second = parsed(force="f"), parsed(force="g", rest="3")
+    both = replace(first, alternatives=(second,))
+    assert both.at_rest(None) is both
+    changed = both.at_rest("2")
+    assert (changed.rest, [each.rest for each in changed.alternatives]) == ("2", ["2"])
+    assert changed.alternatives[0].origins == second.origins
+    assert both.rest is None
+
+
+def test_a_mapping_that_is_given_goes_before_the_file_s_own() -> None:
+    given, own = parsed(force="f"), parsed(force="g", rest="first")
+    assert chosen_over(given, own) is given
+    assert chosen_over(None, own) is own
+    assert chosen_over(None, None) is UNMAPPED
+    assert chosen_over(given, None) is given
+
+
+def test_a_rest_alone_that_is_given_goes_with_the_file_s_own_mapping() -> None:
+    rest_alone, own = UNMAPPED.at_rest("2"), parsed(force="g", rest="first")
+    assert chosen_over(rest_alone, own) == replace(own, rest="2")
+    assert chosen_over(rest_alone, None) == replace(UNMAPPED, rest="2")
+
+
+def test_members_are_usually_under_their_own_names_in_the_topic_of_frames_or_of_the_log() -> None:
+    usual = default_origins("/frame", "/log")
+    assert usual["time"] == Origin(("time",), "/frame", explicit=False)
+    assert usual["position"] == Origin(("position",), "/log", explicit=False)
+    assert usual.keys() == DTYPES.keys()
+
+
+def test_entries_of_some_formats_alone_are_told_where_they_are_given() -> None:
+    assert parsed(force="f").particular_entries == {}
+    assert parsed(
+        force={"field": "f", "topic": "/a"}, episode=0, element="id", notes={"a": "b"}
+    ).particular_entries == {
+        "notes": {"a": "b"},
+        "element": "id",
+        "episode": 0,
+        "topic": "/a",
+    }
+
+
+@pytest.mark.parametrize("width", [1e-9, 0.1])
+def test_a_pixel_is_as_wide_as_any_sensor_s(width: float) -> None:
+    assert parsed(pixel=width).pixel == width
+    for wrong in (0.99 * min(width, 0.05), 1.01 * max(width, 0.1)):
+        if not 1e-9 <= wrong <= 0.1:
+            with pytest.raises(InvalidInput, match=rf"pixel is {wrong:g} m; allowed: 1e-09 to 0.1 m \(is it in m\?\)"):
+                parsed(pixel=wrong)
+
+
+def test_pixels_are_two_whole_numbers() -> None:
+    assert parsed(pixels=[1, 10_000]).pixels == (1, 10_000)
+    with pytest.raises(InvalidInput, match=r"pixels is \[0, 3\]; allowed: two whole numbers of pixels, 1 to 10000"):
+        parsed(pixels=[0, 3])
+    with pytest.raises(InvalidInput, match=r"grid is \[0, 3\]; allowed: two whole numbers of markers, 1 to 10000"):
+        parsed(grid=[0, 3])
+
+
+def test_the_text_of_a_mapping_is_the_same_in_whatever_order_it_was_given() -> None:
+    assert parsed(time="τ", force="f").text == parsed(force="f", time="τ").text == '{"force": "f", "time": "τ"}'
+
+
+@pytest.mark.parametrize(
+    ("unit", "allowed"),
+    [
+        ({"displacement": ["m", "m"]}, 'one a component, such as ["mm", "mm", "deg"]'),
+        ({"time": ["s"]}, "one unit"),
+        ({"time": "min"}, "s, ms, us, µs, ns"),
+        ({"normal": "m"}, "none: it has no unit"),
+    ],
+)
+def test_a_unit_that_is_none_is_refused_with_those_that_are(unit: dict[str, Any], allowed: str) -> None:
+    ((name, given),) = unit.items()
+    with pytest.raises(InvalidInput) as refusal:
+        parsed(**{name: {"field": "x", "unit": given}})
+    assert (refusal.value.name, refusal.value.value, refusal.value.allowed) == (f"unit of {name}", repr(given), allowed)
+
+
+def test_each_component_may_be_turned_by_a_minus() -> None:
+    assert parsed(force={"field": "f", "unit": ["-N", "mN", "-mN"]}).origins["force"].factors == (-1.0, 1e-3, -1e-3)
+    assert parsed(force={"field": "f", "unit": "-mN"}).origins["force"].factors == (-1e-3,)
+
+
+def test_there_are_a_hundred_notes_at_most() -> None:
+    notes = {str(number): "f" for number in range(100)}
+    assert parsed(notes=notes).notes == notes
+    with pytest.raises(InvalidInput, match=r"notes is .*; allowed: an object of names and fields, 100 at most"):
+        parsed(notes=notes | {"more": "f"})
+
+
+def test_what_is_wrong_is_repeated_only_in_part() -> None:
+    with pytest.raises(InvalidInput) as refusal:
+        parsed(**{"y" * 100: 1})
+    assert refusal.value.value == f"of the unknown {'y' * 60!r}"
+    for wrong in ({"force": {"z": "x" * 100}}, {"grid": "x" * 100}, {"force": {"field": "f", "unit": "x" * 100}}):
+        with pytest.raises(InvalidInput) as refusal:
+            parsed(**wrong)
+        assert len(refusal.value.value) == 60
