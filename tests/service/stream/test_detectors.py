@@ -4,17 +4,22 @@ import json
 import re
 import struct
 from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from service import formats
 from service.processes.fair_executor import FairExecutor
 from service.stream import detectors
 from service.stream.detectors import PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
+from slipcore.frames import UNNAMED
+from tests.service.report.test_material import MODEL
 
 ROOM = detectors.MemoryLimit("me", 2**30)
 
@@ -150,3 +155,130 @@ def test_a_frame_is_taken_in_each_length_that_a_refusal_allows() -> None:
         assert detectors._array("force", bytes(length), (2, 3)).tolist() == [[0.0] * 3] * 2
     with pytest.raises(InvalidInput, match=r"5 numbers.*6: \[2, 3\]"):
         detectors._array("force", [1.0] * 5, (2, 3))
+
+
+GRID, AREA = (2, 3), 1e-6
+PLACES = np.stack([*np.meshgrid(1e-3 * np.arange(2.0), 1e-3 * np.arange(3.0), indexing="ij"), np.zeros(GRID)], axis=-1)
+AT_REST = PLACES.ravel().tolist()
+HELD = detectors.WINDOW * 3 * PLACES.nbytes
+"""Bytes of the frames that are looked at."""
+
+
+@pytest.fixture
+def sessions(monkeypatch: pytest.MonkeyPatch) -> dict[str, detectors.DetectorSession]:
+    """All that there are, none at first."""
+    none = dict[str, detectors.DetectorSession]()
+    monkeypatch.setattr(detectors, "_SESSIONS", none)
+    return none
+
+
+def begin(name: str = "one", most: int = 2**30, owner: str = "me", keep: bool = False, grid: Any = GRID) -> None:
+    detectors.open_session(name, AT_REST, grid, AREA, "filter", keep, detectors.MemoryLimit(owner, most))
+
+
+def plain_frame(number: int, **more: Any) -> PackedFrame:
+    return PackedFrame(number, 0.1 * number, [0.0] * len(AT_REST), **more)
+
+
+@pytest.mark.parametrize("grid", [(0, 3), (2, 0), (-2, -3), (1, 4097), (4097, 1)])
+def test_a_sensor_has_one_marker_at_least_and_not_any_number(grid: tuple[int, int]) -> None:
+    with pytest.raises(InvalidInput, match=rf"grid is \[{grid[0]}, {grid[1]}\]; allowed: 1 to 4096 markers"):
+        begin(grid=grid)
+
+
+def test_a_client_has_half_of_what_others_leave(sessions: dict[str, detectors.DetectorSession]) -> None:
+    begin("mine", most=2 * HELD)
+    with pytest.raises(InvalidInput) as refusal:
+        begin("another of mine", most=4 * HELD - 2)
+    assert (refusal.value.name, refusal.value.value) == ("bytes", str(2 * HELD))
+    assert refusal.value.allowed.startswith(f"{2 * HELD - 1} of one client's live streams, half of what others leave")
+    begin("another of mine", most=4 * HELD)
+    with pytest.raises(InvalidInput, match=f"allowed: {HELD - 1} of one client's"):
+        begin("yours", most=4 * HELD - 1, owner="you")
+    begin("yours", most=4 * HELD, owner="you")
+    assert list(sessions) == ["mine", "another of mine", "yours"]
+
+
+def test_kept_frames_take_room_by_what_they_hold(
+    sessions: dict[str, detectors.DetectorSession], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin("plain", keep=True)
+    begin(keep=True)
+    detectors.step("plain", plain_frame(0))
+    whole = {"force": [0.0] * len(AT_REST), "normal": [0.0, 0.0, 1.0] * 6}
+    detectors.step("one", plain_frame(0, **whole))
+    assert sessions["plain"].held_bytes == HELD + PLACES.nbytes
+    assert sessions["one"].held_bytes == HELD + 3 * PLACES.nbytes
+    monkeypatch.setattr(detectors, "MAX_KEPT_BYTES", 6 * PLACES.nbytes)
+    detectors.step("one", plain_frame(1, **whole))
+    with pytest.raises(InvalidInput, match="frames is 3; allowed: 2 of this size, where they are kept"):
+        detectors.step("one", plain_frame(2, **whole))
+    assert len(sessions["one"].kept or ()) == 2
+
+
+@pytest.mark.usefixtures("sessions")
+def test_the_same_frame_again_is_answered_as_before_and_taken_once() -> None:
+    begin(keep=True)
+    answer, _ = detectors.step("one", plain_frame(0))
+    assert detectors.step("one", plain_frame(0, command=-1.0)) == (answer, None)
+    assert (answer["type"], answer["number"], answer["contact"], answer["slip"]) == ("state", 0, 0, [])
+    assert (answer["stick_ratio"], answer["macro_slip"], answer["friction"]) == (None, False, None)
+
+
+@pytest.mark.parametrize("command", [0.0, detectors.MOST_COMMAND])
+@pytest.mark.usefixtures("sessions")
+def test_a_command_may_be_any_force_of_a_planner(command: float) -> None:
+    begin()
+    assert detectors.step("one", plain_frame(0, command=command))[0]["number"] == 0
+    with pytest.raises(InvalidInput, match=r"command is 1000000\.1; allowed: a normal force of 0 to 1e\+06 N"):
+        detectors.step("one", plain_frame(1, command=1e6 + 0.1))
+
+
+@pytest.mark.usefixtures("sessions")
+def test_a_log_of_kept_frames_has_what_all_of_them_had(tmp_path: Path) -> None:
+    begin(keep=True)
+    force = np.linspace(-1.0, 0.0, len(AT_REST)).tolist()
+    detectors.step("one", plain_frame(0, force=force, gripper_force=2.0, gripper_force_deviation=0.25))
+    with pytest.raises(InvalidInput, match="frames is 1; allowed: at least 2, for a log"):
+        detectors.write("one", tmp_path / "log.npz", "left")
+    detectors.step("one", plain_frame(1, force=force, object_pose=[0.0, 0.0, 0.0]))
+    detectors.step("one", plain_frame(2, force=force, gripper_force=3.0, gripper_force_deviation=0.125))
+    told = detectors.write("one", tmp_path / "log.npz", "left")
+    log = formats.read(tmp_path / "log.npz")
+    assert (told.frames, log.sensor, log.metadata) == (3, "left", {"session": "one"})
+    np.testing.assert_allclose(log.time, [0.0, 0.1, 0.2])
+    np.testing.assert_allclose(np.asarray(log.force)[2].ravel(), force)
+    assert (log.object_pose, log.normal) == (None, None)
+    np.testing.assert_array_equal(log.gripper_force, [2.0, 0.0, 3.0])
+    assert log.gripper_force_deviation == 0.25  # as the least sure
+
+
+@pytest.mark.usefixtures("sessions")
+def test_a_log_whose_gripper_said_nothing_says_nothing_of_it(tmp_path: Path) -> None:
+    begin(keep=True)
+    for number in range(2):
+        detectors.step("one", plain_frame(number))
+    detectors.write("one", tmp_path / "log.npz", "")
+    log = formats.read(tmp_path / "log.npz")
+    assert (log.gripper_force, log.gripper_force_deviation, log.sensor) == (None, None, UNNAMED)
+
+
+def test_whoever_is_not_there_is_dropped_without_a_word(sessions: dict[str, detectors.DetectorSession]) -> None:
+    detectors.drop("nobody")
+    begin()
+    detectors.drop("one")
+    assert sessions == {}
+
+
+def test_expected_friction_is_that_under_the_middle_of_the_forces_seen() -> None:
+    found = detectors._expected(cast("Any", MODEL))
+    low, high = (float(MODEL.predict(0.0, 0.07, quantile=level)) for level in (0.05, 0.95))
+    expected = {"mean": float(MODEL.predict(0.0, 0.07)), "low": low, "high": high, "normal_force": 0.07}
+    assert found == pytest.approx(expected)
+    unsure = replace(MODEL, covariance=np.full((3, 3), np.inf))
+    assert detectors._expected(cast("Any", unsure)) is None
+    told = detectors._summary(cast("Any", MODEL))
+    assert told["coefficients"] == [0.45, 0.1, -0.02]
+    assert told["standard_errors"] == pytest.approx([0.02, 1.0, 2.0])
+    assert (told["scale"], told["samples"]) == (0.02, 200)
+    assert detectors._summary(cast("Any", unsure))["standard_errors"] == [None] * 3
