@@ -2,15 +2,19 @@ import configparser
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from stiction_client import (
+    Contact,
     CoulombFriction,
     FrictionModel,
     InvalidArgument,
+    Scale,
+    Scales,
     cone_half_angle,
     conservative_friction,
     contactile_answer,
@@ -26,6 +30,7 @@ from stiction_client import (
     sdf_surface,
     urdf_gazebo,
 )
+from stiction_client.exports.mujoco import MujocoPair, mujoco_pair
 
 Make = Callable[..., FrictionModel]
 
@@ -214,3 +219,73 @@ def test_drake_s_friction_is_asked_for_with_finite_numbers(
 ) -> None:
     with pytest.raises(InvalidArgument, match=name):
         drake_friction(make_model(), 0.1, **{name: value})
+
+
+PAD = Contact(6e-5)
+
+
+def test_a_pair_of_constant_friction_is_that_of_its_elements_under_the_grip(make_model: Make) -> None:
+    model, finger = make_model(), Contact.round(6e-5, at_force=5.0)
+    pair = mujoco_pair(model, ("a", "b"), 8.0, finger)
+    element, elements = finger.element_force(8.0, 1e-6), float(finger.elements(8.0, 1e-6))
+    friction = conservative_friction(model, float(element), contact_area=elements * 1e-6)
+    assert (pair.geom1, pair.geom2, pair.adhesion) == ("a", "b", 0.0)
+    assert pair.sliding == pytest.approx(friction)
+    assert pair.torsional == pytest.approx(float(finger.arm(8.0)) * friction)
+
+
+@pytest.mark.parametrize("points", [1, 4])
+def test_adhesion_makes_up_for_what_the_slope_lacks_shared_by_the_points(make_model: Make, points: int) -> None:
+    """C(F) = (0.8 − 0.01 F) F: under 10 N it is 7 N, and its slope is 0.6."""
+    falling = make_model((0.8, 0.0, -0.6), np.zeros((3, 3)), scale=0.0)
+    pair = mujoco_pair(falling, ("a", "b"), 10.0, PAD, points=points, load_faithful=True)
+    assert pair.sliding == pytest.approx(0.6)
+    assert points * pair.adhesion == pytest.approx(7.0 / 0.6 - 10.0)
+
+
+def test_a_pair_is_written_with_as_many_numbers_as_mujoco_reads() -> None:
+    plain = ElementTree.fromstring(MujocoPair("a", "b", 0.5, 0.0, 0.0).to_xml()).attrib
+    assert plain == {"geom1": "a", "geom2": "b", "condim": "3", "friction": "0.5 0.5 1e-05 1e-05 1e-05"}
+    soft = ElementTree.fromstring(MujocoPair("a", "b", 0.5, 1e-3, 2.5).to_xml()).attrib
+    assert (soft["condim"], soft["friction"], soft["adhesion"]) == ("4", "0.5 0.5 0.001 1e-05 1e-05", "2.5")
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "most", "unit"), [("grip_force", 1e-9, 1e9, "N"), ("points", 1, 1000, "points")]
+)
+def test_a_pair_has_a_force_and_points_within_their_range(
+    make_model: Make, name: str, least: float, most: float, unit: str
+) -> None:
+    sure = make_model((0.4, 0.0, 0.0), np.zeros((3, 3)), scale=0.0, normal_force_domain=(1e-12, 1e8))
+    for value in (least, most):
+        given = {"grip_force": 5.0, name: value}
+        assert mujoco_pair(sure, ("a", "b"), contact=PAD, allow_unidentified=True, **given).geom1 == "a"  # type: ignore[arg-type]
+    for value in (0.9 * least, 1.1 * most):
+        given = {"grip_force": 5.0, name: value}
+        with pytest.raises(InvalidArgument, match=rf"{name} is .*; allowed: .* to .* {unit}"):
+            mujoco_pair(sure, ("a", "b"), contact=PAD, **given)  # type: ignore[arg-type]
+
+
+def test_the_median_is_the_largest_quantile_that_is_exported(make_model: Make) -> None:
+    model = make_model()
+    assert conservative_friction(model, 0.1, 0.5) == pytest.approx(float(model.predict(0.0, 0.1)))
+
+
+def test_scatter_averages_out_over_the_elements_of_the_contact_one_at_least(make_model: Make) -> None:
+    scaled = replace(make_model(), scales=Scales(Scale(1e-4, np.inf), Scale(1e-4, np.inf), Scale(0.05, np.inf)))
+    for area, elements in ((100e-6, 100.0), (1e-6, 1.0), (0.2e-6, 1.0)):
+        expected = float(scaled.predict(0.0, 0.1, 0.05, of="contact", elements=elements))
+        assert conservative_friction(scaled, 0.1, contact_area=area) == pytest.approx(expected)
+    assert conservative_friction(scaled, 0.1) == conservative_friction(scaled, 0.1, contact_area=6e-5)
+
+
+def test_a_cone_is_counted_around_its_normal_from_x(make_model: Make) -> None:
+    friction = conservative_friction(make_model(), 0.1)
+    along = friction * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    np.testing.assert_allclose(friction_cone(make_model(), 0.1, edges=4), np.c_[along, np.ones(4)], atol=1e-15)
+
+
+def test_graspit_has_glass_and_no_pair_with_what_has_no_friction(make_model: Make) -> None:
+    assert graspit_friction(make_model(), ("glass", "stone"), 0.1).materials == ("glass", "stone")
+    with pytest.raises(InvalidArgument, match="materials is 'frictionless'; allowed: two of glass, metal, plastic"):
+        graspit_friction(make_model(), ("frictionless", "stone"), 0.1)

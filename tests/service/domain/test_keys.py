@@ -14,13 +14,6 @@ NOW = datetime.now(UTC)
 STORED = AccessKey("0a" * 6, "robot", "read", hashlib.sha256(TEXT.encode()).hexdigest(), NOW, None)
 
 
-def test_a_new_key_is_known_by_its_id_and_is_no_other() -> None:
-    made = [keys.new_key() for _ in range(20)]
-    assert [keys.key_id(text) for _, text in made] == [key_id for key_id, _ in made]
-    assert len({key_id for key_id, _ in made}) == len({text[22:] for _, text in made}) == 20
-    assert {len(text) for _, text in made} == {len(TEXT)}
-
-
 @pytest.mark.parametrize(
     "text",
     [

@@ -4,12 +4,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from fastapi import Request
 from sqlalchemy import event
 
 from db.database import Database
 from db.paging import Window
 from db.repositories import jobs
 from service.domain import curate, model_cache
+from service.http.conditional import conditional, is_one_of, tagged
 
 PATHS = ("/v1/materials/paper", "/v1/materials/paper/friction?fn=0.05")
 
@@ -99,3 +101,46 @@ def test_the_file_of_a_log_is_not_sent_to_who_has_it(reach: Callable[..., Any], 
     assert lab.get(path, headers={"If-None-Match": '"x"'}).content == content
     part = lab.get(path, headers={"Range": "bytes=0-9", "If-Range": first.headers["etag"]})
     assert (part.status_code, part.content) == (206, content[:10])
+
+
+TAG = '"a1"'
+
+
+@pytest.mark.parametrize(
+    ("listed", "is_known"),
+    [
+        (TAG, True),
+        (f"W/{TAG}", True),
+        (f'"b", {TAG} ,"c"', True),
+        ("*", True),
+        ("", False),
+        ("a1", False),
+        ('"a1', False),
+        ('"a11"', False),
+        (f"w/{TAG}", False),
+        (TAG.ljust(1024), True),
+        (TAG.ljust(1025), False),
+    ],
+)
+def test_a_client_has_what_its_list_of_tags_names(listed: str, is_known: bool) -> None:
+    assert is_one_of(TAG, listed) is is_known
+    made = list[str]()
+
+    def body() -> str:
+        made.append("made")
+        return "{}"
+
+    headers = [(b"if-none-match", listed.encode())]
+    answer = conditional(Request({"type": "http", "headers": headers}), TAG, body)
+    assert (answer.status_code, bytes(answer.body)) == ((304, b"") if is_known else (200, b"{}"))
+    assert (answer.headers["etag"], answer.headers["cache-control"]) == (TAG, "private, no-cache")
+    assert len(made) == (not is_known)
+
+
+def test_a_body_without_a_version_has_its_hash_for_a_tag() -> None:
+    answers = [tagged(Request({"type": "http", "headers": []}), body) for body in ("{}", "{}", "[]")]
+    first, second, other = (answer.headers["etag"] for answer in answers)
+    assert first == second != other
+    assert len(first) == 2 + 24
+    again = tagged(Request({"type": "http", "headers": [(b"if-none-match", first.encode())]}), "{}")
+    assert (again.status_code, answers[0].media_type) == (304, "application/json")
