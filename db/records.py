@@ -255,7 +255,7 @@ class Detection:
     ``calibration``: the version of its sensor's by which the log was corrected, and in ``corrections`` how; None where
     there was none. ``gel``: the mechanics of its sensor's gel as they were described then; None also where an older
     version did not note them. ``fingerprint``: the same in all logs of the same measurements, None where an older
-    version did not take it; ``alike``: those of other logs that it shares most frames with, None of none.
+    version did not take it.
     """
 
     method: str
@@ -275,7 +275,6 @@ class Detection:
     corrections: tuple[str, ...] | None = None
     gel: Gel | None = None
     fingerprint: str | None = None
-    alike: tuple[str, ...] | None = None
 
 
 class SeenClock(NamedTuple):

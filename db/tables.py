@@ -287,7 +287,7 @@ class DetectionRow(Base):
     corrections: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     gel: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     fingerprint: Mapped[str | None] = mapped_column(String(64))
-    alike: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
+    alike: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True), deferred=True)
     signature: Mapped[bytes | None] = mapped_column(LargeBinary, deferred=True)
     created_at: Mapped[datetime] = mapped_column(default=now)
 

@@ -14,13 +14,20 @@ _NEWEST_FIRST = (GraspLogRow.number.desc(), GraspLogRow.id.desc())
 
 
 def add(
-    session: Session, log_id: str, detection: Detection, samples: SampleSummary, signature: bytes | None = None
+    session: Session,
+    log_id: str,
+    detection: Detection,
+    samples: SampleSummary,
+    signature: bytes | None = None,
+    alike: Sequence[str] = (),
 ) -> None:
     """Store what was found in a log, with that by which its grasp is known again in a cut or rounded log: nothing
-    where nothing touched, None where it was not looked for.
+    where nothing touched, None where it was not looked for. ``alike``: fingerprints of others that it shares most
+    frames with, of up to a thousand, so that no list of logs has them.
     """
     velocity, force = samples.tangential_velocity or (None, None), samples.normal_force or (None, None)
-    session.add(DetectionRow(grasp_log_id=log_id, **asdict(detection), signature=signature))
+    found = asdict(detection) | {"signature": signature, "alike": list(alike) or None}
+    session.add(DetectionRow(grasp_log_id=log_id, **found))
     session.add(
         SampleSummaryRow(
             grasp_log_id=log_id,

@@ -206,8 +206,8 @@ def _store_found(run: Run, log_id: str, detection: Detection, summary: SampleSum
             marks = dict.fromkeys([*detections.fingerprints(session, alike), own])
             copied = same_grasp(detections.others_of_grasp(session, log_id, marks))
             findings = (*stored_findings(copied), *(detection.findings or ()))
-            found = replace(detection, alike=tuple(each for each in marks if each != own) or None, findings=findings)
-            detections.add(session, log_id, found, summary, content)
+            found, others_marks = replace(detection, findings=findings), [each for each in marks if each != own]
+            detections.add(session, log_id, found, summary, content, others_marks)
             jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
             return
 

@@ -54,6 +54,7 @@ def test_a_log_comes_back_with_what_was_found_in_one_query(
     assert found.job.material == "paper"
     assert listed == replace(found, samples=replace(samples, moments=None))
     assert ["moments" in statement for statement in statements] == [True, False]
+    assert not any("alike" in statement or "signature" in statement for statement in statements)
 
 
 def test_no_samples_have_no_range(
@@ -202,9 +203,9 @@ def test_grasps_that_one_recording_holds_are_one_beside_it_alone(
     whole = 0 if whole_comes == "first" else 3
     for number, (log_id, mark) in enumerate(zip(ids, marks, strict=True)):
         others = marks[:3] if number == whole == 3 else marks[:1] if number > whole else []
-        found = replace(detection, fingerprint=mark, alike=tuple(others) or None)
+        found, summary = replace(detection, fingerprint=mark), replace(samples, count=500 if number == whole else 100)
         with database.write() as session:
-            detections.add(session, log_id, found, replace(samples, count=500 if number == whole else 100))
+            detections.add(session, log_id, found, summary, alike=others)
 
     counted = partial(copies_of_counted, database, paper)
     cuts = tuple(each for each in ids if each != ids[whole])
