@@ -165,6 +165,11 @@ def test_a_level_that_is_no_number_is_refused(level: float, variance: float) -> 
         ChangeAlarm.init().step(level, variance)
 
 
+def test_settings_at_the_ends_of_their_ranges_are_taken() -> None:
+    alarm = ChangeAlarm.init(rate=1.0 - 1e-9, shift=1e-9, reference=1)
+    assert (alarm.rate, alarm.shift, alarm.reference) == (1.0 - 1e-9, 1e-9, 1)
+
+
 @pytest.mark.parametrize("settings", [{"rate": 0.0}, {"shift": 0.0}, {"reference": 0}])
 def test_settings_that_cannot_be_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InvalidSamples, match=next(iter(settings))):

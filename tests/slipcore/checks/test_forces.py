@@ -1,5 +1,8 @@
 """Forces against the markers and the gripper, on either side of each limit, and the numbers that are told."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -324,3 +327,15 @@ def test_noise_of_one_element_is_no_drift_however_few_frames_begin_or_end_a_gras
         moved = np.median(late, axis=0) - np.median(early, axis=0)
         found += forces._alike(moved, [forces._of_medians(early), forces._of_medians(late)], CheckOptions()) > 0.0
     assert found < 12
+
+
+def test_rest_before_and_after_a_grasp_lies_outside_of_all_frames_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even if markers are back where they were in the first and last of these."""
+    held, touched = np.array([False, False, True, False, True, True, False]), np.ones((1, 1), bool)
+    monkeypatch.setattr(forces, "frames_at_rest", lambda _: np.array([False, True, True, True, True, True, True]))
+    seen: Any = SimpleNamespace(held=held)
+    elements, early, late, where = forces._before_and_after(seen, touched)
+    assert elements is touched
+    assert np.flatnonzero(early).tolist() == [1]
+    assert np.flatnonzero(late).tolist() == [6]
+    assert where == "that it touches"

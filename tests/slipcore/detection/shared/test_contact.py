@@ -1,4 +1,5 @@
 from dataclasses import replace
+from inspect import unwrap
 
 import numpy as np
 import pytest
@@ -134,6 +135,17 @@ def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
     impulse = np.zeros((9, 9))
     impulse[4, 4] = 1.0
     assert np.sqrt((curvature(impulse) ** 2).sum()) == pytest.approx(CURVATURE_NOISE, rel=2e-3)
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_what_is_straight_does_not_bend_up_to_the_last_element(along: int) -> None:
+    """As plain Python, which refuses what lies beyond the field; a parabola bends by 2, and not across its edges."""
+    i, j = np.indices((7, 8)).astype(float)
+    plain = unwrap(curvature)
+    np.testing.assert_allclose(plain(3.0 + 2.0 * i - j + 0.5 * i * j), 0.0, rtol=0.0, atol=1e-12)
+    bend = np.moveaxis(plain((i, j)[along] ** 2), along, 0)
+    np.testing.assert_allclose(bend[2:-2], 2.0, rtol=1e-12)
+    np.testing.assert_allclose(bend[[0, -1]], 0.0, rtol=0.0, atol=1e-12)
 
 
 def test_an_element_touches_that_is_pressed_by_more_than_the_threshold() -> None:
