@@ -108,6 +108,12 @@ def test_frames_agree_once_they_are_enough_and_within_their_spread(values: tuple
         assert not known.of_others
 
 
+def test_friction_that_may_be_none_by_its_error_is_not_known() -> None:
+    """Three errors of a third are all of it."""
+    assert learned(0.4, 0.4, 0.4, 0.4, count=10**6).known(replace(SETTINGS, learned_error=0.3)) is not None
+    assert learned(0.4, 0.4, 0.4, 0.4, count=10**6).known(replace(SETTINGS, learned_error=0.35)) is None
+
+
 def test_no_friction_agrees_with_nothing() -> None:
     assert not LearnedFriction((0.0,) * 4, (4,) * 4, ()).agrees(4, SETTINGS)
 

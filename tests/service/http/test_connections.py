@@ -364,6 +364,14 @@ def test_requests_that_do_not_wait_for_answers_are_all_answered_in_their_order(c
     assert paths == [*(b"/%d" % k for k in range(400)), b"/last"]
 
 
+def test_what_comes_behind_the_last_request_is_passed_over(connect: Connect) -> None:
+    connection = connect()
+    connection.sendall(LAST + KINDS[0] % 1)
+    received = rest(connection)
+    assert received.count(b"HTTP/1.1 ") == received.count(b"HTTP/1.1 200") == 1
+    assert b"path: /last" in received
+
+
 def parsed_requests() -> int:
     return sum(type(each).__name__ == "RequestResponseCycle" for each in gc.get_objects())
 
