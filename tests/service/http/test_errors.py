@@ -11,7 +11,7 @@ from service.domain.errors import (
     NotOwner,
     QuotaExceeded,
 )
-from service.http.errors import OF_USE_CASES, problem_of
+from service.http.errors import OF_USE_CASES, _wrong_value, problem_of
 
 
 def below(kind: type[DomainError]) -> Iterator[type[DomainError]]:
@@ -58,3 +58,46 @@ def test_what_a_client_can_do_stands_in_a_header(error: DomainError, header: tup
 )
 def test_further_facts_are_members_of_the_problem(error: DomainError, members: dict[str, object]) -> None:
     assert problem_of(error).more == members
+
+
+@pytest.mark.parametrize(
+    ("entry", "name", "value", "allowed"),
+    [
+        (
+            {"type": "json_invalid", "loc": ("body", 3), "ctx": {"error": "Expecting value"}},
+            "body",
+            "not JSON (Expecting value)",
+            "a JSON object",
+        ),
+        ({"type": "missing", "loc": ("query", "fn")}, "fn", "missing", "a value"),
+        ({"type": "missing", "loc": ("body",)}, "body", "missing", "a value"),
+        (
+            {
+                "type": "less_than",
+                "loc": ("body", "presses", 2, "force"),
+                "input": 9,
+                "msg": "Input should be less than 5",
+            },
+            "presses.2.force",
+            "9",
+            "less than 5",
+        ),
+        (
+            {"type": "value_error", "loc": ("query", "v"), "input": "x", "msg": "Value error, a number"},
+            "v",
+            "x",
+            "a number",
+        ),
+    ],
+)
+def test_what_the_framework_finds_wrong_is_told_as_any_wrong_value(
+    entry: dict[str, object], name: str, value: str, allowed: str
+) -> None:
+    problem = _wrong_value(entry)
+    assert (problem.kind.name, problem.name, problem.value, problem.allowed) == (
+        "invalid-request",
+        name,
+        value,
+        allowed,
+    )
+    assert problem.detail == f"{name} is {value}; allowed: {allowed}"
