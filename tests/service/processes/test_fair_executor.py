@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+from collections import deque
 from concurrent.futures import Future, wait
 from threading import Event
 
@@ -97,3 +98,14 @@ def test_what_waits_keeps_no_process_from_its_end() -> None:
         begun.wait()
     """
     subprocess.run([sys.executable, "-c", textwrap.dedent(waits)], check=True, timeout=30.0)
+
+
+def test_work_is_long_from_a_second_of_cpu_time_on() -> None:
+    """An owner whose last piece was short again is not kept from all threads but one."""
+    executor = FairExecutor(2)
+    executor._waiting["me"] = deque()
+    executor._served.add("another")
+    executor._note("another", 1.01)
+    for seconds, may_go in ((0.99, True), (1.01, False), (0.5, True)):
+        executor._note("me", seconds)
+        assert (executor._next() == "me") is may_go

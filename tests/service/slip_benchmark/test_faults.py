@@ -171,3 +171,22 @@ def test_dropped_frames_leave_the_others_in_their_order(log: GraspLog) -> None:
     at = np.searchsorted(log.time, left.time)
     assert (np.diff(at) > 0).all()
     np.testing.assert_array_equal(left.displacement, log.displacement[at])
+
+
+def test_on_a_dome_each_force_is_turned_away_from_the_middle_and_stays_as_large(log: GraspLog) -> None:
+    """About the axis that is square to its way out, by an angle in proportion to its distance (Rodrigues)."""
+    told = forces(seen(faults.dome_forces(20.0), log))
+    np.testing.assert_allclose(np.linalg.norm(told, axis=-1), np.linalg.norm(forces(log), axis=-1), rtol=1e-12)
+    middle = (SIDE - 1) / 2
+    for row, column in ((0, 0), (1, 3), (2, 4), (4, 1)):
+        way = np.array([row - middle, column - middle])
+        tilt = np.radians(20.0) * np.hypot(*way) / np.hypot(middle, middle)
+        x, y = way / np.hypot(*way)
+        out, up = np.array([x, y, 0.0]), np.array([0.0, 0.0, 1.0])
+        before = forces(log)[:, row, column]
+        radial, normal = before @ out, before @ up
+        turned = np.outer(np.cos(tilt) * radial + np.sin(tilt) * normal, out)
+        turned += np.outer(np.cos(tilt) * normal - np.sin(tilt) * radial, up)
+        turned += np.outer(before @ np.cross(up, out), np.cross(up, out))
+        np.testing.assert_allclose(told[:, row, column], turned, rtol=0.0, atol=1e-15)
+    np.testing.assert_array_equal(told[:, 2, 2], forces(log)[:, 2, 2])
