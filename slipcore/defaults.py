@@ -254,6 +254,10 @@ class PatchDefaults(Options):
     """Share of a load that may be missed before some motion is taken to meet no friction."""
     rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding of times")] = 1e-9
     """By which a window is widened, so that frames at its ends count."""
+    free_frames: Annotated[int, Option(1, 10_000, "frames", "half a second at 30 fps; a median errs by 30 %")] = 15
+    """In which elements without load show noise, for it to count."""
+    least_known: Annotated[float, Option(0.0, 1.0, "-", "below half, more may be noise than load")] = 0.5
+    """Share of a ratio that was held, below which a bound says that the rest may be noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,11 +8,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
 from slipcore.defaults import NOISE
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three
+
+IntArray = NDArray[np.int64]
 
 
 class NoiseMemory(NamedTuple):
@@ -83,21 +86,40 @@ def lasting_noise_of(time: FloatArray, series: FloatArray, window: float, least:
     ``WHITE`` where noise is less than ``least``, where too few series or frames show it, and where over two frames it
     is hardly more than over one: with a correlation below ``NOISE.least_memory`` three frames show it as well.
     """
-    most = min(round(window / float(np.median(np.diff(time)))) if len(time) > 1 else 0, len(time) // NOISE.least_series)
-    lags = np.unique(np.round(np.geomspace(1.0, max(most, 1), NOISE.lags)).astype(int))
-
-    def terms(memory: float) -> FloatArray:
-        correlated = 1.0 - (4.0 * memory**lags - memory ** (2 * lags)) / 3.0
-        return np.stack([np.ones(len(lags)), correlated, (lags / lags[-1]) ** 4], axis=1)
-
-    if len(lags) <= terms(0.0).shape[1]:
+    lags = lags_within(time, window, len(time))
+    if not len(lags):
         return WHITE
     chosen = np.ascontiguousarray(series[..., np.unique(np.linspace(0, series.shape[2] - 1, NOISE.series).astype(int))])
-    squares, shortest = np.array([_noise_at(time, chosen, lag) for lag in lags]) ** 2, terms(NOISE.least_memory)[:, 1]
-    if not squares.min() > 0.0 or squares[0] < least**2 or squares[1] * shortest[0] < squares[0] * shortest[1]:
+    squares, shortest = np.array([_noise_at(time, chosen, lag) for lag in lags]) ** 2, _terms(lags, NOISE.least_memory)
+    if squares[0] < least**2 or squares[1] * shortest[0, 1] < squares[0] * shortest[1, 1]:
         return WHITE
-    found = fit_memory(squares, terms, longest=math.exp(-1.0 / (NOISE.longest_memory * float(lags[-1]))))
+    return fit_lasting(lags, squares)
+
+
+def lags_within(time: FloatArray, window: float, frames: int) -> IntArray:
+    """Numbers of frames, 1 first, over which noise is compared within ``window`` s; none where so many ``frames`` are
+    too few to show how it lasts.
+    """
+    most = min(round(window / float(np.median(np.diff(time)))) if len(time) > 1 else 0, frames // NOISE.least_series)
+    lags = np.unique(np.round(np.geomspace(1.0, max(most, 1), NOISE.lags)).astype(np.int64))
+    return lags if len(lags) > _terms(lags, 0.0).shape[1] else lags[:0]
+
+
+def fit_lasting(lags: IntArray, squares: FloatArray) -> Lasting:
+    """How noise lasts by which values part, in mean ``squares`` [k], from the lines through those ``lags`` [k] frames
+    before and after; ``WHITE`` where some do not.
+    """
+    if not squares.min() > 0.0:
+        return WHITE
+    longest = math.exp(-1.0 / (NOISE.longest_memory * float(lags[-1])))
+    found = fit_memory(squares, lambda memory: _terms(lags, memory), longest)
     return Lasting(max(found.deviation / math.sqrt(float(squares[0])), 1.0), found.frames)
+
+
+def _terms(lags: IntArray, memory: float) -> FloatArray:
+    """What white noise, correlated noise and a load that changes smoothly add at each of the lags, [k, 3]."""
+    correlated = 1.0 - (4.0 * memory**lags - memory ** (2 * lags)) / 3.0
+    return np.stack([np.ones(len(lags)), correlated, (lags / lags[-1]) ** 4], axis=1)
 
 
 def _noise_at(time: FloatArray, series: FloatArray, lag: int) -> float:

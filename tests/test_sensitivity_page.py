@@ -37,7 +37,10 @@ ENTRIES = {
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor", "0 but of reconstructed forces, whose deviation it is"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
-    "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),
+    "slipcore.PATCHES": (
+        "descents free_frames free_motion least_known least_square_arm rank settled still",
+        "compiled kernels hold them, and least_known words a reason",
+    ),
 }
 """Entries of other tables that are not on it."""
 

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from slipcore.defaults import NORMAL_95, PatchOptions, choose_options
+from slipcore.defaults import NORMAL_95, PATCHES, PatchOptions, choose_options
 from slipcore.frames import FloatArray
 from slipcore.patch_record import ContactFriction, Patch, bounds_of, frames_of, joined
 
@@ -23,7 +23,10 @@ def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: floa
     held, low = _largest(time, patches, chosen)
     if not held > 0.0:
         return None
-    return ContactFriction(held, low * (1.0 - NORMAL_95 * chosen.resultant_error), np.inf, True, _why_none(patches))
+    reason = _why_none(patches)
+    if low < PATCHES.least_known * held:
+        reason += f"; of the ratio of {held:.2g} that was held, all but {low:.2g} may be noise of the forces"
+    return ContactFriction(held, low * (1.0 - NORMAL_95 * chosen.resultant_error), np.inf, True, reason)
 
 
 def _at_limit(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) -> ContactFriction:

@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.defaults import DEVIATION_TO_SIGMA, PATCHES
+from slipcore.defaults import PATCHES
 from slipcore.frames import FloatArray
 from slipcore.limit_surface import Descent, find_limit_load
-from slipcore.noise import median
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 CLOSE_ENOUGH = Descent(PATCHES.descents, PATCHES.settled, PATCHES.still, PATCHES.rank, PATCHES.free_motion)
@@ -57,55 +56,6 @@ def resultants(
     return Resultants(sums[:, 0], sums[:, 1:3], *sums[:, 3:].T)
 
 
-def noise_of_sums(
-    time: FloatArray, force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans
-) -> FloatArray:
-    """Noise [k, 2] N of forces on an element, across the normal and along it, by which the sums of a patch would be as
-    noisy as they are.
-
-    Of F_x, F_y, M and F_n of ``resultants`` each value is compared with the line through those before and after it, at
-    ``time`` [t] s, over the noise that 1 N on each of their elements would give that: elements come and go. Medians are
-    taken over a patch's frames (those that did not change left out), of the first three the noisiest counts. Noise that
-    elements share or smooth adds up in sums to more than their own shows; that of a patch of few elements shows here
-    alone. 0 where fewer than three frames show it.
-    """
-    loads, squares = np.empty((len(spans.frame), 4)), np.empty((len(spans.frame), 4))
-    _fill_loads(for_kernels(force), for_kernels(normal), for_kernels(place), spans, loads, squares)
-    noise = np.zeros(loads.shape)
-    _fill_noise(time[spans.frame], spans.bounds, loads, squares, noise)
-    return np.stack([noise[:, :3].max(axis=1), noise[:, 3]], axis=-1)
-
-
-@compiled
-def _fill_loads(
-    force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, loads: FloatArray, squares: FloatArray
-) -> None:
-    """F_x, F_y, M and F_n [k, 4] of all frames of the patches, and the variance that noise of 1 N gives each."""
-    for e, k in enumerate(spans.frame):
-        patch = elements_at(spans, e)
-        pressing, arm, load = _felt(force[k], normal[k], place[k], patch)
-        loads[e, :3], loads[e, 3] = load, pressing.sum()
-        squares[e], squares[e, 2] = len(patch), (arm * arm).sum()
-
-
-@compiled
-def _fill_noise(time: FloatArray, bounds: IntArray, loads: FloatArray, squares: FloatArray, noise: FloatArray) -> None:
-    """Of each of the sums [k, 4], the same for all frames of a patch."""
-    for p in range(len(bounds) - 1):
-        begin, end = bounds[p], bounds[p + 1]
-        for axis in range(loads.shape[1]):
-            residual, count, load, square = np.empty(end - begin), 0, loads[:, axis], squares[:, axis]
-            for e in range(begin + 1, end - 1):
-                late = (time[e] - time[e - 1]) / (time[e + 1] - time[e - 1])
-                off = load[e] - (1.0 - late) * load[e - 1] - late * load[e + 1]
-                variance = square[e] + (1.0 - late) ** 2 * square[e - 1] + late**2 * square[e + 1]
-                if off != 0.0 and math.isfinite(off) and variance > 0.0:
-                    residual[count] = abs(off) / math.sqrt(variance)
-                    count += 1
-            if count > 0:
-                noise[begin:end, axis] = DEVIATION_TO_SIGMA * median(residual[:count])
-
-
 @compiled
 def _fill_sums(
     force: FloatArray,
@@ -132,7 +82,7 @@ def _of_frame(
     force_noise: FloatArray,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Of one frame, in the order of ``Resultants``."""
-    pressing, arm, load = _felt(force, normal, place, patch)
+    pressing, arm, load = felt_by(force, normal, place, patch)
     total = pressing.sum()
     if not total > 0.0:
         return 0.0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
@@ -144,13 +94,13 @@ def _of_frame(
 
 
 @compiled
-def _felt(
+def felt_by(
     force: FloatArray, normal: FloatArray, place: FloatArray, patch: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Normal forces [e] of a frame's elements, their arms [2, e] about the centre of pressure, and the load on the
     patch: F_x, F_y and M. Arms and load are NaN where nothing presses.
     """
-    axes = _axes(_mean_normal(force, normal, patch))
+    axes = axes_of(force, normal, patch)
     f, r = _in_axes(force, patch, axes), _in_axes(place, patch, axes)
     pressing, arm = -f[2], r[:2]
     total = pressing.sum()
@@ -212,6 +162,12 @@ def _in_axes(field: FloatArray, patch: IntArray, axes: FloatArray) -> FloatArray
         for axis in range(3):
             found[axis, e] = axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
     return found
+
+
+@compiled
+def axes_of(force: FloatArray, normal: FloatArray, patch: IntArray) -> FloatArray:
+    """In a frame, of the patch's elements together: as ``_axes`` of their mean normal."""
+    return _axes(_mean_normal(force, normal, patch))
 
 
 @compiled

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slipcore.patch.resultants import Resultants, noise_of_sums, resultants
+from slipcore.patch.resultants import Resultants, resultants
 from tests.slipcore.patch.spans import one_patch
 
 RADIUS, FRICTION = 6e-3, 0.45
@@ -114,25 +114,3 @@ def test_the_noise_of_a_smoothed_moment_is_that_of_the_arms_it_is_summed_over() 
     spans = one_patch(np.ones((400, 7, 7), bool))
     felt = resultants(force, np.broadcast_to(UP, force.shape), place, spans, 0.8e-3, 1e-3)
     assert felt.ratio_noise.mean() == pytest.approx(felt.load_ratio.std(), rel=0.1)
-
-
-def test_noise_of_sums_is_told_apart_across_the_normal_and_along_it() -> None:
-    random, time = np.random.default_rng(1), np.cumsum(np.random.default_rng(2).uniform(0.5, 1.5, 2000))
-    force = np.array([0.3, 0.0, -1.0]) + random.standard_normal((2000, 3, 3, 3)) * np.array([0.01, 0.02, 0.05])
-    place = np.zeros(force.shape)
-    spans = one_patch(np.ones((2000, 3, 3), bool))
-    found = noise_of_sums(time, force, np.broadcast_to(UP, force.shape), place, spans)
-    np.testing.assert_allclose(found[[0, -1]], [[0.02, 0.05]] * 2, rtol=0.1)
-
-
-def test_elements_that_come_and_go_are_no_noise_of_sums() -> None:
-    """Five at the rim that bear nothing, in every third frame: noise had come out 30 to 100 times as large."""
-    force = np.zeros((300, 9, 7, 3))
-    force[:, 2:7, 1:6] = [0.3, 0.0, -1.0]
-    force += 1e-3 * np.random.default_rng(1).standard_normal(force.shape)
-    place = np.zeros(force.shape)
-    place[..., :2] = 1e-3 * np.stack(np.meshgrid(np.arange(7.0), np.arange(9.0)), axis=-1)
-    contact = np.ones((300, 9, 7), bool)
-    contact[np.arange(300) % 3 > 0, 0] = False
-    found = noise_of_sums(np.arange(300) / 60.0, force, np.broadcast_to(UP, force.shape), place, one_patch(contact))
-    np.testing.assert_allclose(found[0], 1e-3, rtol=0.15)
