@@ -14,7 +14,7 @@ from http import HTTPStatus
 from time import perf_counter
 from typing import Any
 
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.config import Config
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -298,7 +298,7 @@ class BoundedConnection(asyncio.Protocol):
     async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         refusal = self._refusal(scope)
         if refusal is None:
-            await self._served(scope, receive, send)
+            await self._served(scope, receive, _closing_unread(self.cycle, send))
         else:
             await asyncio.sleep(_seconds_until(refusal[0]))
             await _refuse(*refusal, scope, send)
@@ -320,6 +320,21 @@ class BoundedConnection(asyncio.Protocol):
         if _length_of_offer(self.headers) > OFFER_BYTES:
             return None
         return super()._get_upgrade()  # type: ignore[misc]  # of the server's protocol
+
+
+def _closing_unread(cycle: Any, send: Send) -> Send:
+    """Send, and say that the connection ends where a client still waits for leave to send its body (RFC 9110, 10.1.1).
+
+    Without leave it may send the body or leave it out, so that nobody could tell where its next request begins.
+    """
+
+    async def closing(message: Message) -> None:
+        is_unread = cycle.waiting_for_100_continue and cycle.more_body and not cycle.body
+        if is_unread and message["type"] == "http.response.start":
+            message = {**message, "headers": [*message.get("headers", ()), (b"connection", b"close")]}
+        await send(message)
+
+    return closing
 
 
 def _address(connection: Any) -> str | None:

@@ -132,6 +132,37 @@ def test_who_goes_on_with_a_body_after_its_answer_is_let_go(connect: Connect) ->
     assert TIMEOUT * 0.9 < time.monotonic() - began < 5.0
 
 
+EXPECTING = b"Host: a\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n"
+
+
+def test_who_is_answered_before_he_may_send_his_body_is_told_that_the_connection_ends(connect: Connect) -> None:
+    """His next request was taken for the body, and never answered."""
+    connection = connect()
+    connection.sendall(b"POST /early HTTP/1.1\r\n" + EXPECTING)
+    answer = rest(connection)
+    assert answer.startswith(b"HTTP/1.1 200")
+    assert answer.lower().count(b"connection: close\r\n") == 1
+    assert answer.endswith(b"hello")
+
+
+def test_who_was_let_send_his_body_may_ask_again(connect: Connect) -> None:
+    connection = connect()
+    for _ in range(2):
+        connection.sendall(b"POST / HTTP/1.1\r\n" + EXPECTING)
+        assert until(connection, b"\r\n\r\n").startswith(b"HTTP/1.1 100")
+        connection.sendall(b"xy")
+        answer = until(connection, b"hello").lower()
+        assert b"received: 2\r\n" in answer
+        assert b"connection: close" not in answer
+
+
+def test_who_waits_for_nothing_with_no_body_may_ask_again(connect: Connect) -> None:
+    connection = connect()
+    for _ in range(2):
+        connection.sendall(b"GET /early HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\n\r\n")
+        assert b"connection: close" not in until(connection, b"hello").lower()
+
+
 def test_who_trickles_headers_is_let_go_all_the_same(connect: Connect) -> None:
     began, connection = time.monotonic(), connect()
     connection.sendall(b"GET / HTTP/1.1\r\nHost: a\r\n")
