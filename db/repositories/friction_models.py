@@ -21,14 +21,17 @@ _PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in _OT
 def add(session: Session, material_id: int, job_id: str, model: NewModel, *, outdated: bool = False) -> int:
     """Store a model as the next version and make it the current one; returns the version.
 
-    ``outdated``: the material's logs are others by now than those that it was fitted to.
+    ``outdated``: the material's logs are others by now than those that it was fitted to. It does not take the place of
+    one that is not.
     """
     lock(session, material_id)
     of_this_kind = (FrictionModelRow.material_id == material_id, FrictionModelRow.method == model.method)
     newest = session.scalar(select(func.max(FrictionModelRow.version)).where(*of_this_kind))
     version = (newest or 0) + 1
-    session.execute(update(FrictionModelRow).where(*of_this_kind, FrictionModelRow.current).values(current=False))
-    session.add(_row(material_id, job_id, version, model, outdated))
+    replaced = (*of_this_kind, FrictionModelRow.current, *([FrictionModelRow.outdated] if outdated else []))
+    session.execute(update(FrictionModelRow).where(*replaced).values(current=False))
+    stays = select(FrictionModelRow.id).where(*of_this_kind, FrictionModelRow.current)
+    session.add(_row(material_id, job_id, version, model, current=session.scalar(stays) is None, outdated=outdated))
     session.flush()
     return version
 
@@ -148,12 +151,14 @@ def _models() -> Select[FrictionModelRow, str]:
     return select(FrictionModelRow, MaterialRow.name).join(MaterialRow)
 
 
-def _row(material_id: int, job_id: str, version: int, model: NewModel, outdated: bool) -> FrictionModelRow:
+def _row(
+    material_id: int, job_id: str, version: int, model: NewModel, *, current: bool, outdated: bool
+) -> FrictionModelRow:
     return FrictionModelRow(
         material_id=material_id,
         job_id=job_id,
         version=version,
-        current=True,
+        current=current,
         outdated=outdated,
         tangential_velocity_min=model.tangential_velocity[0],
         tangential_velocity_max=model.tangential_velocity[1],

@@ -1,6 +1,7 @@
 """Put jobs into the queue, in the transaction of what they are about."""
 
 import logging
+from collections.abc import Collection
 
 from sqlalchemy.orm import Session
 
@@ -48,8 +49,13 @@ def queue(
     return job_id
 
 
-def queue_cheap_refits(session: Session, material_id: int, requested_by: str | None) -> None:
-    """Let outdated models of a material be fitted again where that is cheap, and is not queued already."""
+def queue_cheap_refits(
+    session: Session, material_id: int, requested_by: str | None, besides: Collection[str] = ()
+) -> None:
+    """Let outdated models of a material be fitted again where that is cheap, and is not queued already.
+
+    ``besides``: methods by which they are in any case.
+    """
     for method in friction_models.outdated_methods(session, material_id):
-        if method in CHEAP_METHODS and jobs.queued_fit(session, material_id, method) is None:
+        if method in CHEAP_METHODS.union(besides) and jobs.queued_fit(session, material_id, method) is None:
             queue(session, "fit", method, material_id=material_id, requested_by=requested_by)

@@ -229,7 +229,7 @@ def fit_material(run: Run) -> None:
             is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
             parts = detections.samples_of_material(session, material_id) if is_still else []
             if parts == basis.parts or (parts and tries >= MOST_REPEATS):
-                _store_models(run, session, material_id, models, outdated=parts != basis.parts)
+                _store_models(run, session, material_id, models, basis.parts, parts)
                 return
 
 
@@ -324,12 +324,20 @@ def _note_missing_moments(run: Run) -> None:
 
 
 def _store_models(
-    run: Run, session: Session, material_id: int, models: Sequence[FrictionModel], *, outdated: bool
+    run: Run,
+    session: Session,
+    material_id: int,
+    models: Sequence[FrictionModel],
+    fitted: Sequence[SamplesOfLog],
+    parts: Sequence[SamplesOfLog],
 ) -> None:
-    """Store the models and close the job, in one transaction with what they were fitted to; it names the first.
+    """Store the models and close the job, in one transaction with what they were ``fitted`` to; it names the first.
 
-    ``outdated``: that is others by now, so that they are fitted once more where that is cheap.
+    Where ``parts`` are others by now, they are fitted once more: by a method that is not cheap only if they were fitted
+    to logs that count no longer, since who withdrew those did not know of this fit.
     """
+    outdated = fitted != parts
+    misled = {part.grasp_log_id for part in fitted} - {part.grasp_log_id for part in parts}
     with run.timed("material"):
         # before the models, of which a job may have one a method
         jobs.start_stage(session, run.claim, "material", run.seconds)
@@ -338,7 +346,8 @@ def _store_models(
         new = [to_new_model(model) for model in models]
         versions = [friction_models.add(session, material_id, run.job.id, each, outdated=outdated) for each in new]
         if run.job.kind == "ingest" or outdated:
-            queue_cheap_refits(session, material_id, run.job.requested_by)
+            again = [model.method for model in models] if misled else []
+            queue_cheap_refits(session, material_id, run.job.requested_by, again)
     jobs.finish(session, run.claim, "done", model_version=versions[0], seconds=run.seconds)
 
 

@@ -534,22 +534,31 @@ def test_moments_that_an_older_version_did_not_store_are_made_up_for(
     assert newest.model.coefficients == older.model.coefficients
 
 
-def test_a_fit_that_logs_overtake_is_made_again(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    shop.run(shop.ingest(content)[1])
-    fit = estimators.fit
-    overtaken: list[int] = []
+def overtake(monkeypatch: pytest.MonkeyPatch, change: Callable[[int], object]) -> list[int]:
+    """Do something under each fit from now on, told how many there were; returns how many logs each was of."""
+    fit, fitted = estimators.fit, list[int]()
 
-    def slow_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
-        if len(overtaken) < pipeline.MOST_REPEATS:
-            overtaken.append(len(parts))
-            monkeypatch.setattr(estimators, "fit", fit)
-            shop.run(shop.ingest(another_grasp(content, len(overtaken)))[1])
-            monkeypatch.setattr(estimators, "fit", slow_fit)
+    def overtaken_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
+        fitted.append(len(parts))
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(estimators, "fit", fit)
+            change(len(fitted))
         return fit(parts, **options)
 
-    monkeypatch.setattr(estimators, "fit", slow_fit)
+    monkeypatch.setattr(estimators, "fit", overtaken_fit)
+    return fitted
+
+
+def test_a_fit_that_logs_overtake_is_made_again(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    shop.run(shop.ingest(content)[1])
+
+    def add(count: int) -> None:
+        if count <= pipeline.MOST_REPEATS:
+            shop.run(shop.ingest(another_grasp(content, count))[1])
+
+    fitted = overtake(monkeypatch, add)
     assert shop.run(shop.fit()).model_version == 2 + pipeline.MOST_REPEATS
-    assert overtaken == [1, 2, 3]
+    assert fitted == [1, 2, 3, 4]
 
 
 def test_nobody_waits_for_a_fit_that_logs_overtake_all_the_time(
@@ -557,49 +566,75 @@ def test_nobody_waits_for_a_fit_that_logs_overtake_all_the_time(
 ) -> None:
     """The last time it was made within a transaction, and whoever wrote to SQLite waited until he was refused."""
     shop.run(shop.ingest(content)[1])
-    fit, fitted = estimators.fit, list[int]()
-
-    def overtaken_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
-        fitted.append(len(parts))
-        monkeypatch.setattr(estimators, "fit", fit)
-        shop.run(shop.ingest(another_grasp(content, len(fitted)))[1])
-        monkeypatch.setattr(estimators, "fit", overtaken_fit)
-        return fit(parts, **options)
-
-    monkeypatch.setattr(estimators, "fit", overtaken_fit)
-    assert shop.run(shop.fit()).status == "done"
+    fitted = overtake(monkeypatch, lambda count: shop.run(shop.ingest(another_grasp(content, count))[1]))
+    assert shop.run(shop.fit("conjugate")).status == "done"
     assert fitted == [1 + tries for tries in range(1 + pipeline.MOST_REPEATS)]
     assert {stored.model.method: stored.outdated for stored in shop.material().models} == {
+        "conjugate": True,
         "hierarchical": False,
-        "ols": True,
+        "ols": False,
     }
-    monkeypatch.setattr(estimators, "fit", fit)
+    monkeypatch.undo()
     with shop.database.read() as session:
-        refit = jobs.queued_fit(session, shop.material_id, "ols")
+        refit = jobs.queued_fit(session, shop.material_id, "conjugate")
     assert refit is not None
     assert shop.run(refit).status == "done"
     assert not any(stored.outdated for stored in shop.material().models)
+
+
+def test_a_model_of_fewer_logs_does_not_take_the_place_of_one_of_all(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That another job stored meanwhile: friction was told by four logs of five."""
+    shop.run(shop.ingest(content)[1])
+    overtake(monkeypatch, lambda count: shop.run(shop.ingest(another_grasp(content, count))[1]))
+    version = shop.run(shop.fit()).model_version
+    with shop.database.read() as session:
+        newest, current, *_ = friction_models.versions(session, shop.material_id, "ols")
+        assert jobs.queued_fit(session, shop.material_id, "ols") is None
+    assert (newest.version, newest.current, newest.outdated) == (version, False, True)
+    assert (current.current, current.outdated) == (True, False)
+    assert current.model.n > newest.model.n
+
+
+@pytest.mark.parametrize("change", ["withdrawn", "added"])
+def test_a_first_model_of_logs_that_were_withdrawn_under_its_fit_is_fitted_again(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    """By a method that is not cheap, too: who withdraws a log asks for fits by those of which there is a model."""
+    logs = [shop.ingest(another_grasp(content, number)) for number in range(2 + pipeline.MOST_REPEATS)]
+    for _, ingest in logs:
+        shop.run(ingest)
+
+    def alter(count: int) -> None:
+        if change == "added":
+            shop.run(shop.ingest(another_grasp(content, 10 + count))[1])
+            return
+        with shop.database.write() as session:
+            grasp_logs.withdraw(session, logs[count][0], "wet", None)
+
+    fitted = overtake(monkeypatch, alter)
+    assert shop.run(shop.fit("robust")).status == "done"
+    assert len(fitted) == 1 + pipeline.MOST_REPEATS
+    with shop.database.read() as session:
+        refit = jobs.queued_fit(session, shop.material_id, "robust")
+    assert (refit is not None) == (change == "withdrawn")
 
 
 def test_no_model_of_logs_that_were_all_withdrawn_under_its_fit_is_stored(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shop.run(shop.ingest(content)[1])
-    fit, fitted = estimators.fit, list[int]()
 
-    def overtaken_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
-        fitted.append(len(parts))
-        monkeypatch.setattr(estimators, "fit", fit)
-        if len(fitted) <= pipeline.MOST_REPEATS:
-            shop.run(shop.ingest(another_grasp(content, len(fitted)))[1])
-        else:
-            with shop.database.write() as session:
-                grasp_logs.withdraw_before(session, shop.material_id, None, "worn", None)
-                friction_models.retire(session, shop.material_id)
-        monkeypatch.setattr(estimators, "fit", overtaken_fit)
-        return fit(parts, **options)
+    def alter(count: int) -> None:
+        if count <= pipeline.MOST_REPEATS:
+            shop.run(shop.ingest(another_grasp(content, count))[1])
+            return
+        with shop.database.write() as session:
+            grasp_logs.withdraw_before(session, shop.material_id, None, "worn", None)
+            friction_models.retire(session, shop.material_id)
 
-    monkeypatch.setattr(estimators, "fit", overtaken_fit)
+    fitted = overtake(monkeypatch, alter)
     assert shop.run(shop.fit()).status == "refused"
     assert len(fitted) == 1 + pipeline.MOST_REPEATS
     assert not shop.material().models
