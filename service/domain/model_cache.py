@@ -224,15 +224,15 @@ def _chosen(session: Session, material: str, material_id: int, models: Sequence[
 
 
 def _bound(session: Session, material_id: int) -> str:
-    """What is known without a model, if anything: by logs that nothing speaks against."""
+    """What is known without a model, if anything: by its newest logs that nothing speaks against."""
     bounds = detections.least_frictions(session, material_id, MOST_BOUNDS)
     sound = [least for least, names in bounds if all(severity_of(name) != "warning" for name in names)]
     least = max(sound, default=0.0)
     if least <= 0.0:
         return ""
     return (
-        f"; in the grasp that held best friction was at least {least:.2g}, by the load that its contact bore: the next "
-        "one may hold less"
+        f"; of its newest grasps the one that held best bore a load for which friction was at least {least:.2g}: the "
+        "next one may hold less"
     )
 
 
