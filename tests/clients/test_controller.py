@@ -400,6 +400,11 @@ def test_a_setting_outside_of_its_range_is_refused_by_name(wrong: dict[str, Any]
     assert refusal.value.name == name
 
 
+def test_a_setting_without_effect_is_taken_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match="contradiction_share has no effect any more"):
+        assert dataclasses.replace(SETTINGS, contradiction_share=0.1).contradiction_share == 0.1
+
+
 def test_utilisation_is_cattaneo_s_and_mindlin_s() -> None:
     contact = HertzContact(0.015, 10.0, half_space(1e6, 0.0))
     for share in (0.1, 0.5, 0.9):
@@ -436,6 +441,33 @@ def test_samples_refute_a_model_as_soon_as_they_are_enough(count: int, refuted: 
         seen = SlipSamples(np.full(count, 0.36), np.full(count, 0.05))
         state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
     assert (state.known is None, command.mode == "alarm") == (refuted, refuted)
+
+
+@pytest.mark.parametrize("friction", [0.34, 0.56])
+@pytest.mark.parametrize(("count", "refuted"), [(1, False), (12, True)])
+def test_a_frame_is_evidence_by_the_number_of_its_elements(
+    friction: float, count: int, refuted: bool, make_model: Make
+) -> None:
+    """Three frames of one element each refute no model, whether it shows less friction or more."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    seen = SlipSamples(np.full(count, friction), np.full(count, 0.05))
+    modes = []
+    for frame in range(1, 4):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+        modes.append(command.mode)
+    assert ("alarm" in modes) is refuted
+
+
+def test_elements_that_rest_do_not_refute_what_was_learnt() -> None:
+    state = GraspController.init(SETTINGS)
+    for frame in range(1, 60):
+        seen = SlipSamples(np.full(10, 0.45), np.full(10, 0.05))
+        state, _ = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+    assert state.known is not None
+    for frame in range(60, 70):
+        rest = SlipSamples(np.full(20, 0.3), np.full(20, 0.05), moving=0.1)
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, rest))
+        assert command.mode == "hold"
 
 
 def test_more_friction_than_promised_refutes_no_model_at_once(make_model: Make) -> None:

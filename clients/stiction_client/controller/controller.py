@@ -88,16 +88,15 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     sticking = state.sticking.step(observation, load.size, state.settings)
     sampled = _sampled(observation, sticking, state.settings)
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, sticking, load.size, state.settings)
-    friction = sampled if agrees else math.nan
     learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
     counts = samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees)
     if samples is not None and counts:
         learned = learned.with_frame(sampled, samples.normal_force.size, agrees, state.settings)
     if recognition is not None:
-        told = friction if counts else math.nan
+        told = sampled if agrees and counts else math.nan
         count = 0 if samples is None else samples.normal_force.size
         recognition = recognition.step(observation.time, _loaded(load, state.settings), told, count, state.settings)
-    against = _contradicts(state, sticking, observation.normal, load.size, friction)
+    against = _contradicts(state, sticking, observation.normal, load.size)
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
@@ -135,22 +134,12 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
     return warns or samples.moving >= state.settings.moving_share
 
 
-def _contradicts(
-    state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float, friction: float
-) -> bool | None:
-    """Whether a frame speaks against the friction that is known; None where it says nothing of it.
-
-    Friction of slipping elements outside of what the model permits, or slip under a load that it says is held.
-    """
-    if state.known is None or normal == 0.0:
+def _contradicts(state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float) -> bool | None:
+    """Whether a contact slips under a load that the friction that is known holds; None where a frame says nothing."""
+    if state.known is None or normal == 0.0 or math.isnan(sticking.stick_ratio):
         return None
-    low, high = state.known.bounds(normal)
-    share = state.settings.contradiction_share
-    if not math.isnan(friction) and not low * (1.0 - share) <= friction <= high * (1.0 + share):
-        return True
-    if sticking.slips(state.settings) and 0.0 < size < low * normal:
-        return True
-    return None if math.isnan(friction) and math.isnan(sticking.stick_ratio) else False
+    low, _ = state.known.bounds(normal)
+    return sticking.slips(state.settings) and 0.0 < size < low * normal
 
 
 def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
@@ -187,7 +176,7 @@ def _forgotten(state: ControllerState) -> ControllerState:
 
 
 def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> bool:
-    """Whether all samples together, or some frames in a row, speak against what is known."""
+    """Whether all samples together speak against what is known, or slip in some frames in a row does."""
     if state.contradictions >= state.settings.contradiction_frames:
         return True
     return normal > 0.0 and known.refuted(state.learned, state.load.size, normal, state.settings)

@@ -66,15 +66,17 @@ class KnownFriction:
         return low, 2.0 * mean - low
 
     def refuted(self, learned: "LearnedFriction", size: float, force: float, settings: ControlSettings) -> bool:
-        """Whether the latest samples together speak for less friction under ``force`` N than both errors explain.
+        """Whether the latest samples together speak for other friction under ``force`` N than both errors explain.
 
-        A contact that bears a load of ``size`` N has at least that friction, whatever samples say.
+        A contact that bears a load of ``size`` N has at least that friction, whatever samples say; more friction than
+        promised is no danger, and waits for ``contradiction_frames``.
         """
         if not learned.values:
             return False
         low, mean = self._low_and_mean(force)
         error = math.hypot((mean - low) / self.deviations, learned.error(settings) * mean)
-        return mean - max(learned.mean, size / force) > settings.contradiction_deviations * error
+        away = learned.mean - mean if len(learned.values) >= settings.contradiction_frames else 0.0
+        return max(away, mean - max(learned.mean, size / force)) > settings.contradiction_deviations * error
 
     def sharpen(self, learned: "LearnedFriction", force: float, settings: ControlSettings) -> "KnownFriction":
         """The same with what the samples of this grasp say under ``force`` N, once ``contradiction_frames`` agree.

@@ -1,5 +1,6 @@
 """Every gain of the grip controller, with unit, range and reason."""
 
+import warnings
 from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, get_type_hints
 
@@ -16,6 +17,10 @@ class Gain(NamedTuple):
     high: float
     unit: str
     reason: str
+
+
+WITHOUT_EFFECT = 0.05
+"""``contradiction_share``, until it goes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,14 +101,16 @@ class ControlSettings:
         int, Gain(1, 100, "frames", "50 ms at 60 frames/s; one frame is wrong too often")
     ] = 3
     contradiction_share: Annotated[
-        float, Gain(0.0, 1.0, "-", "beyond the model's quantile: samples of one frame err by that much")
-    ] = 0.05
+        float, Gain(0.0, 1.0, "-", "has no effect any more: samples count together, by their elements")
+    ] = WITHOUT_EFFECT
     dropout_time: Annotated[float, Gain(1e-3, 10.0, "s", "three frames at 30 frames/s")] = 0.1
     unknown_friction: Annotated[
         float, Gain(0.01, 10.0, "-", "of what robots lift, little is more slippery: the usual fixed value")
     ] = 0.2
 
     def __post_init__(self) -> None:
+        if self.contradiction_share != WITHOUT_EFFECT:
+            warnings.warn("contradiction_share has no effect any more", DeprecationWarning, stacklevel=3)
         for name, gain in gains().items():
             value = getattr(self, name)
             if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):
