@@ -71,6 +71,11 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     ]
 
 
+def logs_that_count(session: Session, material_id: int) -> Sequence[Row[Any]]:
+    """What ``samples_of_material`` goes by, with each log's ``id``, of which little is read: the same while that is."""
+    return session.execute(_of_samples(_WHICH, material_id).order_by(GraspLogRow.number, GraspLogRow.id)).all()
+
+
 def others_of_grasp(session: Session, log_id: str, fingerprints: Collection[str]) -> list[str]:
     """Ids of other logs of its material with one of these, in the order they were sent: not withdrawn, with samples."""
     own = select(GraspLogRow.material_id, GraspLogRow.sha256).where(GraspLogRow.id == log_id)
@@ -155,10 +160,11 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
         counts[row.sha256] = row.samples
         if row.fingerprint is None:
             continue
+        of_content = grasp(marks.setdefault(row.sha256, row.fingerprint))
         for mark in there.intersection([row.fingerprint, *(row.alike or ())]):
-            of_content, other = grasp(marks.setdefault(row.sha256, row.fingerprint)), grasp(mark)
-            if other != of_content:
-                joined[other] = of_content
+            if (other := grasp(mark)) != of_content:
+                joined[of_content] = other  # to which most of the others are joined
+                of_content = other
     groups: dict[str, list[str]] = {}
     for content, mark in marks.items():
         groups.setdefault(grasp(mark), []).append(content)
@@ -167,22 +173,33 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     return {counted: [each for each in found if each != counted] for counted, found in chosen if len(found) > 1}
 
 
+_WHICH = (
+    GraspLogRow.id,
+    GraspLogRow.number,
+    SensorRow.name.label("sensor"),
+    SampleSummaryRow.samples_blob,
+    DetectionRow.created_at.label("found_at"),
+    DetectionRow.signature.is_not(None).label("has_signature"),
+)
+_WHAT = (
+    GraspLogRow.sha256,
+    GraspLogRow.created_at,
+    SampleSummaryRow.count.label("samples"),
+    SampleSummaryRow.moments,
+    DetectionRow.findings,
+    DetectionRow.fingerprint,
+    DetectionRow.alike,
+)
+
+
 def _samples(material_id: int) -> Select[*tuple[Any, ...]]:
+    return _of_samples((*_WHICH, *_WHAT), material_id)
+
+
+def _of_samples(columns: tuple[Any, ...], material_id: int) -> Select[*tuple[Any, ...]]:
     return (
-        select(
-            GraspLogRow.sha256,
-            GraspLogRow.id,
-            SampleSummaryRow.count.label("samples"),
-            SampleSummaryRow.samples_blob,
-            SampleSummaryRow.moments,
-            DetectionRow.findings,
-            DetectionRow.fingerprint,
-            DetectionRow.alike,
-            DetectionRow.signature.is_not(None).label("has_signature"),
-            SensorRow.name.label("sensor"),
-            GraspLogRow.created_at,
-            GraspLogRow.number,
-        )
+        select(*columns)
+        .select_from(GraspLogRow)
         .join(SampleSummaryRow)
         .join(SensorRow, SensorRow.id == GraspLogRow.sensor_id)
         .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)

@@ -12,8 +12,9 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import count
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from sqlalchemy import Row
 from sqlalchemy.orm import Session
 
 import estimators
@@ -227,9 +228,9 @@ def fit_material(run: Run) -> None:
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
-            parts = detections.samples_of_material(session, material_id) if is_still else []
-            if parts == basis.parts or (parts and tries >= MOST_REPEATS):
-                _store_models(run, session, material_id, models, basis.parts, parts)
+            counting = detections.logs_that_count(session, material_id) if is_still else []
+            if counting == basis.logs or (counting and tries >= MOST_REPEATS):
+                _store_models(run, session, material_id, models, basis.logs, counting)
                 return
 
 
@@ -243,10 +244,11 @@ def _with_forces(run: Run, log: GraspLog, gel: Gel | None) -> "tuple[GraspLog, R
 
 
 class Basis(NamedTuple):
-    """What a material is fitted by: the samples of its logs, how much grasps may differ before its own show it, and its
-    current models by method.
+    """What a material is fitted by: its logs that count, by which it is known while they are the same, their samples,
+    how much grasps may differ before its own show it, and its current models by method.
     """
 
+    logs: Sequence[Row[Any]]
     parts: list[SamplesOfLog]
     prior: ScatterPrior
     before: dict[str, NewModel]
@@ -255,6 +257,7 @@ class Basis(NamedTuple):
 def _basis(run: Run, session: Session, material_id: int) -> Basis:
     before = friction_models.all_current(session, [material_id]).get(material_id, [])
     return Basis(
+        detections.logs_that_count(session, material_id),
         detections.samples_of_material(session, material_id),
         prior_from_others(session, material_id) if run.others_tell else ScatterPrior(),
         {stored.model.method: stored.model for stored in before},
@@ -263,7 +266,7 @@ def _basis(run: Run, session: Session, material_id: int) -> Basis:
 
 def _fit(run: Run, basis: Basis) -> list[FrictionModel]:
     """The models of the job's methods."""
-    parts, prior, before = basis
+    _, parts, prior, before = basis
     if not parts:
         raise InsufficientData("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"
@@ -328,16 +331,17 @@ def _store_models(
     session: Session,
     material_id: int,
     models: Sequence[FrictionModel],
-    fitted: Sequence[SamplesOfLog],
-    parts: Sequence[SamplesOfLog],
+    fitted: Sequence[Row[Any]],
+    counting: Sequence[Row[Any]],
 ) -> None:
-    """Store the models and close the job, in one transaction with what they were ``fitted`` to; it names the first.
+    """Store the models and close the job, in one transaction with the logs that they were ``fitted`` to; it names the
+    first.
 
-    Where ``parts`` are others by now, they are fitted once more: by a method that is not cheap only if they were fitted
-    to logs that count no longer, since who withdrew those did not know of this fit.
+    Where others are ``counting`` by now, they are fitted once more: by a method that is not cheap only if they were
+    fitted to logs that count no longer, since who withdrew those did not know of this fit.
     """
-    outdated = fitted != parts
-    misled = {part.grasp_log_id for part in fitted} - {part.grasp_log_id for part in parts}
+    outdated = fitted != counting
+    misled = {log.id for log in fitted} - {log.id for log in counting}
     with run.timed("material"):
         # before the models, of which a job may have one a method
         jobs.start_stage(session, run.claim, "material", run.seconds)

@@ -2,9 +2,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from typing import Any
 
 import pytest
 from sqlalchemy import event, func, select, update
+from sqlalchemy.orm import Session
 
 from db.database import Database
 from db.errors import AlreadyExists, NotFound
@@ -55,6 +57,38 @@ def test_a_log_comes_back_with_what_was_found_in_one_query(
     assert listed == replace(found, samples=replace(samples, moments=None))
     assert ["moments" in statement for statement in statements] == [True, False]
     assert not any("alike" in statement or "signature" in statement for statement in statements)
+
+
+def test_whether_the_same_logs_count_is_told_without_what_is_long(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    statements: list[str],
+) -> None:
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+    ids = [add(database, new_log(material)) for _ in range(2)]
+    seen = list[Any]()
+    changes: list[Callable[[Session], object]] = [
+        lambda session: detections.add(session, ids[0], detection, samples),
+        lambda session: detections.add(session, ids[1], detection, samples),
+        lambda session: detections.remove(session, ids[0]),
+        lambda session: detections.add(session, ids[0], detection, samples),
+        lambda session: grasp_logs.withdraw(session, ids[1], "wet", None),
+        lambda session: grasp_logs.change_sensor(session, ids[0], "another"),
+    ]
+    for change in changes:
+        with database.write() as session:
+            change(session)
+        statements.clear()
+        with database.read() as session:
+            found = detections.logs_that_count(session, material)
+            assert detections.logs_that_count(session, material) == found
+        assert not any(name in statement for statement in statements for name in ("alike", "moments", "findings"))
+        assert found not in seen
+        seen.append(found)
+    assert [[log.id for log in found] for found in seen] == [ids[:1], ids, ids[1:], ids, ids[:1], ids[:1]]
 
 
 def test_no_samples_have_no_range(

@@ -597,6 +597,20 @@ def test_a_model_of_fewer_logs_does_not_take_the_place_of_one_of_all(
     assert current.model.n > newest.model.n
 
 
+def test_samples_are_not_read_while_others_wait(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that each of thousands of copies of a grasp is alike was read once more where the models are stored."""
+    read, engines = detections.samples_of_material, list[Any]()
+
+    def noting(session: Session, material_id: int) -> Any:
+        engines.append(session.get_bind())
+        return read(session, material_id)
+
+    monkeypatch.setattr(detections, "samples_of_material", noting)
+    assert shop.run(shop.ingest(content)[1]).status == "done"
+    assert engines
+    assert all(engine is shop.database._reading for engine in engines)
+
+
 @pytest.mark.parametrize("change", ["withdrawn", "added"])
 def test_a_first_model_of_logs_that_were_withdrawn_under_its_fit_is_fitted_again(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, change: str
