@@ -156,6 +156,14 @@ def test_who_was_let_send_his_body_may_ask_again(connect: Connect) -> None:
         assert b"connection: close" not in answer
 
 
+def test_who_did_not_wait_with_his_body_may_ask_again(connect: Connect) -> None:
+    connection = connect()
+    for _ in range(2):
+        connection.sendall(b"POST /early HTTP/1.1\r\n" + EXPECTING + b"x")
+        assert b"connection: close" not in until(connection, b"hello").lower()
+        connection.sendall(b"y")
+
+
 def test_who_waits_for_nothing_with_no_body_may_ask_again(connect: Connect) -> None:
     connection = connect()
     for _ in range(2):
