@@ -97,6 +97,9 @@ def campaign(
         str | None,
         typer.Option(envvar="STICTION_DASK_ADDRESS", help="A Dask scheduler, whose workers do it in their place."),
     ] = None,
+    written_as: Annotated[
+        str, typer.Option("--format", help='"npz", or "parquet" for one data set in folders by scene and seed.')
+    ] = "npz",
     json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
 ) -> None:
     """Simulate many grasps, each scene with many seeds, on all cores or on a Dask cluster."""
@@ -105,7 +108,7 @@ def campaign(
 
     wanted = [Scene.from_toml(scene) for scene in scenes]
     with workers(processes or os.cpu_count() or 1, dask_address) as executor:
-        outcomes = run(executor, wanted, range(seeds), output, RequestedAccuracy(accuracy, seconds, tier))
+        outcomes = run(executor, wanted, range(seeds), output, RequestedAccuracy(accuracy, seconds, tier), written_as)
         made = list(counted(outcomes, len(wanted) * seeds, "logs"))
     _print_campaign(made, output, json)
     if any(outcome.refused for outcome in made):
@@ -117,7 +120,9 @@ def _print_campaign(made: "Iterable[Outcome]", folder: Path, json: bool) -> None
     if json:
         print_json({"logs": [asdict(outcome) | {"path": str(outcome.path)} for outcome in rows]})
     else:
-        cells = [(outcome.scene, outcome.seed, outcome.refused or outcome.path.name) for outcome in rows]
+        cells = [
+            (outcome.scene, outcome.seed, outcome.refused or str(outcome.path.relative_to(folder))) for outcome in rows
+        ]
         print_table(str(folder), ("scene", "seed", "log"), cells)
 
 

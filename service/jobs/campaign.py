@@ -1,7 +1,8 @@
 """Simulate scenes with many seeds each, on the processors of this machine or on the workers of a Dask cluster.
 
 A folder holds a campaign: ``campaign.json`` says what is simulated, and how; beside it stands one log for each scene
-and seed, written whole or not at all. Whoever starts it again gets what is missing.
+and seed, written whole or not at all. Whoever starts it again gets what is missing. Parquet files are one data set, in
+folders named as Hive does, ``logs/scene=NAME/seed=0``.
 """
 
 import hashlib
@@ -15,17 +16,18 @@ from pathlib import Path
 from typing import Any
 
 from db.errors import DriverMissing
+from service.formats import writing
 from service.observability import logs
 from service.processes import spawned
 from service.whole_files import write_whole
 from slipcore.contact import Scene, simulate
 from slipcore.errors import InvalidInput, SlipcoreError
 from slipcore.frames import GraspLog
-from stiction_client import container
 
 PLAN = "campaign.json"
 CONNECT_SECONDS = 10.0
 """s that a Dask scheduler may take to answer."""
+FORMATS = ("npz", "parquet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,26 +82,39 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def run(
-    executor: Executor, scenes: Sequence[Scene], seeds: Sequence[int], folder: Path, promise: RequestedAccuracy
+    executor: Executor,
+    scenes: Sequence[Scene],
+    seeds: Sequence[int],
+    folder: Path,
+    promise: RequestedAccuracy,
+    written_as: str = "npz",
 ) -> Iterator[Outcome]:
     """Simulate each scene with each seed that the folder lacks; what is there comes first, the others as they are made.
 
-    Raises ``InvalidInput`` for two scenes of one name, and for a folder that holds another campaign.
+    Logs are ``written_as`` one of ``FORMATS``. Raises ``InvalidInput`` for two scenes of one name, and for a folder
+    that holds another campaign.
     """
-    _write_plan(folder, scenes, promise)
+    _write_plan(folder, scenes, promise, written_as)
     under_way: dict[Future[GraspLog], Outcome] = {}
     for scene in scenes:
         for seed in seeds:
-            outcome = Outcome(scene.name, seed, folder / f"{_file_name(scene)}-{seed}.npz")
+            outcome = Outcome(scene.name, seed, folder / _place(scene, seed, written_as))
             if outcome.path.exists():
                 yield outcome
             else:
                 under_way[executor.submit(simulate, scene, seed=seed, **asdict(promise))] = outcome
     for done in as_completed(list(under_way)):
-        yield _kept(done, under_way.pop(done))
+        yield _kept(done, under_way.pop(done), written_as)
 
 
-def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
+def _place(scene: Scene, seed: int, written_as: str) -> Path:
+    name = _file_name(scene)
+    if written_as == "parquet":
+        return Path("logs", f"scene={name}", f"seed={seed}", "log.parquet")
+    return Path(f"{name}-{seed}.npz")
+
+
+def _kept(done: Future[GraspLog], outcome: Outcome, written_as: str) -> Outcome:
     """The log, once it is written; what was refused is reported, and the others go on."""
     try:
         log = done.result()
@@ -107,19 +122,25 @@ def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
         return replace(outcome, refused=str(error))
     except Exception as error:  # its process died, or the cluster did
         return replace(outcome, refused=f"{type(error).__name__}: {error}")
-    write_whole(outcome.path, lambda path: container.write(log, path))
+    outcome.path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(outcome.path, lambda path: writing.write(log, path, written_as))
     return outcome
 
 
-def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccuracy) -> None:
+def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccuracy, written_as: str) -> None:
     """Write down what the folder holds; more scenes may come to it, but none may change."""
+    if written_as not in FORMATS:
+        raise InvalidInput("format", written_as, " or ".join(FORMATS))
     names = [_file_name(scene) for scene in scenes]
     for name in names:
         if names.count(name) > 1:
             raise InvalidInput("scenes", f"{name!r} twice", "scenes of different names")
     folder.mkdir(parents=True, exist_ok=True)
     path, asked = folder / PLAN, asdict(promise)
-    known = _read_plan(path) if path.exists() else {"scenes": {}, "promise": asked}
+    new: dict[str, Any] = {"scenes": {}, "promise": asked, "format": written_as}
+    known = _read_plan(path) if path.exists() else new
+    if known["format"] != written_as:
+        raise InvalidInput(f"campaign in {folder}", written_as, f"{known['format']}, or another folder")
     if known["promise"] != asked:
         raise InvalidInput(
             f"campaign in {folder}", _plan_text(asked), f"{_plan_text(known['promise'])}, or another folder"
@@ -131,10 +152,11 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccurac
     write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
 
 
-def _read_plan(path: Path) -> dict[str, dict[str, Any]]:
+def _read_plan(path: Path) -> dict[str, Any]:
     try:
         known = json.loads(path.read_text(encoding="utf-8"))
-        return {name: dict(known[name]) for name in ("scenes", "promise")}
+        parts = {name: dict(known[name]) for name in ("scenes", "promise")}
+        return parts | {"format": str(known.get("format", "npz"))}  # of a plan that names none
     except (ValueError, KeyError, TypeError) as error:
         raise InvalidInput("campaign", f"{path}, damaged or of something else", "a folder of its own") from error
 

@@ -1,7 +1,9 @@
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from service import formats
@@ -32,6 +34,44 @@ def test_each_scene_is_simulated_with_each_seed(tmp_path: Path) -> None:
     assert first.truth is not None
     assert first.truth.friction.coefficients[0] == 0.7
     assert not np.array_equal(first.displacement, second.displacement)  # noise of its own
+
+
+def test_parquet_files_are_one_data_set_of_scenes_and_seeds_with_their_truth(tmp_path: Path) -> None:
+    scenes = [scene(), scene("Another: press", friction=0.7)]
+    made = list(campaign.run(Here(), scenes, range(2), tmp_path, QUICK, "parquet"))
+    found = pq.read_table(tmp_path / "logs").to_pandas()
+    assert set(zip(found["scene"], found["seed"], strict=True)) == {
+        ("a_press", 0), ("a_press", 1), ("another_press", 0), ("another_press", 1),
+    }  # fmt: skip
+    for outcome in made:
+        alone = formats.read(outcome.path)
+        assert alone.truth is not None
+        own = found[(found["scene"] == outcome.path.parts[-3].removeprefix("scene=")) & (found["seed"] == outcome.seed)]
+        np.testing.assert_array_equal(own["time"], alone.time)
+        np.testing.assert_array_equal(own["truth_stick_ratio"], alone.truth.stick_ratio)
+        assert (
+            np.stack([np.stack([np.stack(row) for row in frame]) for frame in own["force"]]).shape == alone.force.shape
+        )
+    before = {outcome.path: outcome.path.stat().st_mtime_ns for outcome in made}
+    assert {each.path for each in campaign.run(Here(), scenes, range(2), tmp_path, QUICK, "parquet")} == before.keys()
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+
+
+def test_a_format_that_is_none_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="format is csv; allowed: npz or parquet"):
+        list(campaign.run(Here(), [scene()], range(1), tmp_path / "new", QUICK, "csv"))
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_folder_holds_logs_of_one_format(tmp_path: Path) -> None:
+    list(campaign.run(Here(), [scene()], range(1), tmp_path, QUICK))
+    plan = tmp_path / campaign.PLAN
+    told = json.loads(plan.read_text(encoding="utf-8"))
+    del told["format"]  # a plan of before
+    plan.write_text(json.dumps(told), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="parquet; allowed: npz, or another folder"):
+        list(campaign.run(Here(), [scene()], range(1), tmp_path, QUICK, "parquet"))
+    assert len(list(campaign.run(Here(), [scene()], range(1), tmp_path, QUICK))) == 1
 
 
 def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
