@@ -154,6 +154,7 @@ def _fill_free(
 
     A sum over fewer elements than the patch has counts as if all of its noise were common to them.
     """
+    found, sums, sides = np.zeros(len(time), np.bool_), np.empty((len(time), 3)), np.zeros(len(time), np.int64)
     for p in range(len(spans.bounds) - 1):
         begin, end = spans.bounds[p], spans.bounds[p + 1]
         residual, count = np.empty((3, end - begin)), 0
@@ -162,22 +163,32 @@ def _fill_free(
             if not (lag <= k < len(time) - lag and math.isfinite(loads.loads[e, 0])):
                 continue
             late = (time[k] - time[k - lag]) / (time[k + lag] - time[k - lag])
-            off = force[k] - (1.0 - late) * force[k - lag] - late * force[k + lag]
-            row, column, side = _largest_square(off, spans.labels[k - lag], spans.labels[k], spans.labels[k + lag])
+            if not found[k]:  # the same for all patches of a frame
+                off = force[k] - (1.0 - late) * force[k - lag] - late * force[k + lag]
+                sides[k] = _sum_of_square(off, spans.labels[k - lag], spans.labels[k], spans.labels[k + lag], sums[k])
+                found[k] = True
+            side = sides[k]
             if side == 0:
                 continue
             alike = max(math.sqrt(loads.squares[e, 0]) / side, 1.0)
             share = alike / (side * math.sqrt(1.0 + (1.0 - late) ** 2 + late**2))
             for axis in range(3):
-                total = 0.0
-                for i in range(row - side + 1, row + 1):
-                    for j in range(column - side + 1, column + 1):
-                        total += (loads.axes[e, axis] * off[i, j]).sum()
-                residual[axis, count] = share * abs(total)
+                residual[axis, count] = share * abs((loads.axes[e, axis] * sums[k]).sum())
             count += 1
         if count >= _FREE_FRAMES:
             for axis in range(3):
                 noise[p, axis] = DEVIATION_TO_SIGMA * median(residual[axis, :count])
+
+
+@compiled
+def _sum_of_square(off: FloatArray, before: IntArray, now: IntArray, after: IntArray, total: FloatArray) -> int:
+    """Side of the largest square of elements without load, and the ``total`` [3] of what these changed by, ``off``."""
+    row, column, side = _largest_square(off, before, now, after)
+    total[:] = 0.0
+    for i in range(row - side + 1, row + 1):
+        for j in range(column - side + 1, column + 1):
+            total += off[i, j]
+    return side
 
 
 @compiled
@@ -189,7 +200,8 @@ def _largest_square(off: FloatArray, before: IntArray, now: IntArray, after: Int
     sides, row, column, side = np.zeros((n + 1, m + 1), np.int64), 0, 0, 0
     for i in range(n):
         for j in range(m):
-            if max(before[i, j], now[i, j], after[i, j]) == NOWHERE and np.any(off[i, j] != 0.0):
+            changed = off[i, j, 0] != 0.0 or off[i, j, 1] != 0.0 or off[i, j, 2] != 0.0
+            if changed and max(before[i, j], now[i, j], after[i, j]) == NOWHERE:
                 sides[i + 1, j + 1] = 1 + min(sides[i, j], sides[i, j + 1], sides[i + 1, j])
                 if sides[i + 1, j + 1] > side:
                     row, column, side = i, j, sides[i + 1, j + 1]

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.detector.bounds import common_lasting, lasting
 from slipcore.frames import FloatArray
 from slipcore.noise_memory import WHITE, Lasting
-from slipcore.patch.sum_noise import SumNoise, _largest_square, noise_of_sums
+from slipcore.patch.sum_noise import SumNoise, _largest_square, _sum_of_square, noise_of_sums
 from tests.slipcore.patch.spans import one_patch
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -105,3 +105,13 @@ def test_the_largest_square_is_of_elements_that_are_free_and_change() -> None:
         assert _largest_square(off, before, now, after)[2] == 3
     assert _largest_square(still, labels, labels, labels)[2] == 5
     assert _largest_square(0.0 * off, labels, labels, labels)[2] == 0
+
+
+def test_a_sum_is_over_the_largest_square_alone() -> None:
+    labels, total = np.full((4, 6), -1), np.ones(3)
+    labels[:, 3] = 0
+    off = np.arange(1.0, 73.0).reshape(4, 6, 3)
+    assert _sum_of_square(off, labels, labels, labels, total) == 3
+    np.testing.assert_allclose(total, off[:3, :3].sum(axis=(0, 1)))
+    assert _sum_of_square(0.0 * off, labels, labels, labels, total) == 0
+    np.testing.assert_array_equal(total, 0.0)
