@@ -88,7 +88,7 @@ class NoiseDefaults(Options):
     least_memory: Annotated[float, Option(0.0, 1.0, "-", "shorter noise is seen as well in three frames")] = 0.3
     """Correlation of noise from frame to frame above which it counts as lasting."""
     longest_memory: Annotated[float, Option(0.1, 100.0, "-", "of noise that lasts longer too few values are seen")] = (
-        4.0
+        1.0
     )
     """Longest time constant of noise, over the time within which it is looked at."""
     step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3

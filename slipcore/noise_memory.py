@@ -52,7 +52,7 @@ class Lasting(NamedTuple):
 WHITE = Lasting(1.0, 1.0)
 
 
-def fit_memory(squares: FloatArray, terms: Callable[[float], FloatArray], longest: float = 1.0) -> NoiseMemory:
+def fit_memory(squares: FloatArray, terms: Callable[[float], FloatArray], longest: float) -> NoiseMemory:
     """The noise of which mean squares [k] are made, by least relative errors, with φ below ``longest``.
 
     ``terms``(φ) [k, 2 or more]: what a variance of 1 of white noise, of correlated noise, and of anything else, adds.
@@ -61,12 +61,17 @@ def fit_memory(squares: FloatArray, terms: Callable[[float], FloatArray], longes
     def misfit(memory: float) -> float:
         return _variances(squares, terms(memory))[1]
 
-    tried = np.linspace(0.0, longest, NOISE.memories + 2)[:-1]
-    near = int(np.argmin([misfit(memory) for memory in tried]))
-    low, high = tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)]
+    tried = np.linspace(0.0, longest, NOISE.memories + 2)
+    near = int(np.argmin([misfit(memory) for memory in tried[:-1]]))
+    low, high = tried[max(near - 1, 0)], tried[near + 1]
     memory = float(minimize_scalar(misfit, bounds=(low, high), method="bounded").x)
     (white, correlated, *_), _ = _variances(squares, terms(memory))
     return NoiseMemory(float(white), float(correlated), memory)
+
+
+def longest_memory(lag: int) -> float:
+    """Largest φ that frames up to so many apart are taken to show: of more, load that drifts is not told apart."""
+    return math.exp(-1.0 / (NOISE.longest_memory * lag))
 
 
 def _variances(squares: FloatArray, terms: FloatArray) -> tuple[FloatArray, float]:
@@ -111,8 +116,7 @@ def fit_lasting(lags: IntArray, squares: FloatArray) -> Lasting:
     """
     if not squares.min() > 0.0:
         return WHITE
-    longest = math.exp(-1.0 / (NOISE.longest_memory * float(lags[-1])))
-    found = fit_memory(squares, lambda memory: _terms(lags, memory), longest)
+    found = fit_memory(squares, lambda memory: _terms(lags, memory), longest_memory(int(lags[-1])))
     return Lasting(max(found.deviation / math.sqrt(float(squares[0])), 1.0), found.frames)
 
 

@@ -13,7 +13,7 @@ from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate, unknown
 from slipcore.calibration.press import PressLog
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.noise_memory import fit_memory
+from slipcore.noise_memory import fit_memory, longest_memory
 
 
 def marker_noise(presses: list[PressLog]) -> tuple[Estimate, Estimate]:
@@ -81,5 +81,8 @@ def _change(plane: FloatArray, free: BoolArray, lag: int) -> tuple[FloatArray, i
 def _fit(variogram: FloatArray) -> tuple[float, float]:
     """Standard deviation, and correlation from frame to frame, of the process that fits best to D(1 …) [lags]."""
     lag = np.arange(1, len(variogram) + 1)
-    found = fit_memory(0.5 * variogram, lambda memory: np.stack([np.ones(len(lag)), 1.0 - memory**lag], axis=1))
+    longest = longest_memory(len(lag))
+    found = fit_memory(
+        0.5 * variogram, lambda memory: np.stack([np.ones(len(lag)), 1.0 - memory**lag], axis=1), longest
+    )
     return found.deviation, found.correlation

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks.detector.bounds import lasting
 from slipcore.frames import FloatArray
@@ -33,8 +34,20 @@ def test_the_memory_of_noise_is_found_below_the_longest() -> None:
     def terms(memory: float) -> FloatArray:
         return np.stack([np.ones(len(lag)), 1.0 - memory**lag], axis=1)
 
-    assert fit_memory(terms(0.8) @ [1.0, 2.0], terms) == pytest.approx((1.0, 2.0, 0.8), rel=1e-3)
-    assert fit_memory(terms(0.9) @ [0.0, 2.0], terms, longest=0.7).memory == pytest.approx(0.7, rel=0.06)
+    for memory in (0.8, 0.99):
+        found = fit_memory(terms(memory) @ [1.0, 2.0], terms, longest=0.999)
+        assert found == pytest.approx((1.0, 2.0, memory), rel=1e-2)
+    assert fit_memory(terms(0.9) @ [0.0, 2.0], terms, longest=0.7).memory == pytest.approx(0.7, rel=1e-3)
+
+
+def test_noise_that_lasts_for_many_frames_of_a_fast_log_is_known() -> None:
+    """For 0.1 s at 1 kHz: it had been taken for half as large, and a fifth as long."""
+    memory, time = float(np.exp(-0.01)), np.arange(2000) / 1000.0
+    rng = np.random.default_rng(1)
+    noise = lfilter([5e-3 * np.sqrt(1.0 - memory**2)], [1.0, -memory], rng.standard_normal((3000, 3, 16)), axis=0)
+    shown = np.sqrt((1.5 - 2.0 * memory + 0.5 * memory**2) / 1.5)
+    found = lasting_noise_of(time, noise[1000:], 0.5, 1e-4)
+    np.testing.assert_allclose(found, [1.0 / shown, (1.0 + memory) / (1.0 - memory)], rtol=0.3)
 
 
 def test_frames_that_know_no_more_than_one_are_the_integral_of_the_correlation() -> None:
