@@ -9,12 +9,13 @@ from benchmarks.detector.bounds import (
     SMOOTHING,
     TIME_CONSTANT,
     Bounds,
-    both,
     common,
+    common_lasting,
     held_by,
     lasting,
     page,
     smoothed,
+    smoothed_lasting,
     summary,
     white,
 )
@@ -61,11 +62,18 @@ def test_lasting_noise_is_of_one_and_fades_with_its_time_constant(frames: int) -
     assert autocorrelation(found, frames) == pytest.approx(np.exp(-frames / TIME_CONSTANT), abs=0.03)
 
 
-def test_noise_that_is_both_lasts_and_is_smooth() -> None:
-    found = both((2000, 12, 12, 3), rng())
+def test_smoothed_noise_that_lasts_is_both() -> None:
+    found = smoothed_lasting((2000, 12, 12, 3), rng())
     assert autocorrelation(found, 5) == pytest.approx(np.exp(-0.5), abs=0.1)
     middle = found[:, 5:8, 5:8]
     assert np.mean(middle[:, 1:] * middle[:, :-1]) / middle.var() > 0.7
+
+
+def test_common_noise_that_lasts_is_one_for_all_and_fades_with_its_time_constant() -> None:
+    found = common_lasting((20000, 6, 5, 3), rng())
+    np.testing.assert_array_equal(found, np.broadcast_to(found[:, :1, :1], found.shape))
+    assert found[:, 0, 0].std() == pytest.approx(1.0 / np.sqrt(30.0), rel=0.1)
+    assert autocorrelation(found[:, 0, 0], 5) == pytest.approx(np.exp(-0.5), abs=0.05)
 
 
 def test_bounds_are_counted_against_the_truth_where_there_are_any() -> None:
