@@ -89,7 +89,7 @@ def draw(found: list[Rate]) -> Figure:
     axes.set_xticks([k + 0.2 for k in range(len(names))], names)
     axes.axhline(ASKED, color="0.4", ls="--", label="asked of two cores")
     axes.set(ylabel="logs an hour")
-    axes.legend(fontsize=8)
+    figure.legend(loc="outside upper center", ncols=3, fontsize=8)
     return figure
 
 
