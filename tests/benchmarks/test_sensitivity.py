@@ -59,6 +59,7 @@ def test_a_row_tells_each_change_or_what_failed() -> None:
     assert math.isnan(count.largest)
 
 
+@pytest.mark.filterwarnings("ignore:contradiction_share has no effect:DeprecationWarning")
 def test_what_a_controller_must_be_given_has_no_row_and_what_it_refuses_says_so() -> None:
     def measure(name: str, value: float) -> dict[str, float]:
         contact = Contact.flat(1e-4)
