@@ -174,7 +174,7 @@ class SufficientStatistics:
         is_finite = np.isfinite([n, weight, square, area, *values[:3], *values[7:]]).all()
         if not (is_finite and min(n, weight, square) >= 0.0 and area > 0.0):
             allowed = "finite numbers, counts and weights of at least 0, and an element area above 0 m²"
-            raise InvalidSamples("moments", "not finite or negative", allowed)
+            raise InvalidSamples("moments", "not finite, negative or of no area", allowed)
         factor = Factor(weight, np.array(values[:3]), triangle)
         domain = Domain((values[3], values[4]), (values[5], values[6]))
         unknown, rest = _read_unknown(rest) if magic == WITH_UNKNOWN else ((0.0, 0.0), rest)

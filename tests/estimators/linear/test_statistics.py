@@ -142,7 +142,7 @@ def spoilt(place: int, value: float) -> bytes:
     ],
 )
 def test_numbers_that_no_moments_have_are_refused(place: int, value: float) -> None:
-    with pytest.raises(InvalidSamples, match="moments is not finite or negative"):
+    with pytest.raises(InvalidSamples, match="moments is not finite, negative or of no area"):
         Moments.from_bytes(spoilt(place, value))
 
 
