@@ -163,7 +163,8 @@ class Settings(BaseSettings):
     )
     key_changes_a_day: Annotated[int, Field(ge=1, le=10**9)] | None = Field(
         default=None,
-        description="Changes of materials, names and sensors that one key may make in 24 hours. Default: any number.",
+        description="Changes of materials, names and sensors that one key may make, and fits that it may ask for, in "
+        "24 hours. Default: any number.",
     )
     lease_seconds: Annotated[float, Field(ge=0.5, le=600.0)] = Field(
         default=10.0, description="How long a process may be silent, in s, before others take its jobs over."

@@ -23,6 +23,7 @@ def request_fit(
     material_id = materials.hold(session, material)
     check_may_add(session, material_id, principal)
     quotas.check_job(session, settings, principal.key_id)
+    quotas.check_change(session, settings, principal.key_id)
     job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
     record(session, principal, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
     return jobs.get(session, job_id)

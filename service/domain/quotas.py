@@ -27,6 +27,7 @@ CHANGES: tuple[AuditAction, ...] = (
     "grasp_log.sensor_changed",
     "grasp_log.withdrawn",
     "grasp_log.restored",
+    "fit.requested",
 )
 """Those of which a key could otherwise store any number. What takes a name or a log away is never refused: the first
 withdrawal of a log counts, and another reason for it, or its being taken back, may be refused.
@@ -75,7 +76,7 @@ def check_change(session: Session, settings: Settings, key_id: str | None) -> No
         return
     lock(session, settings, key_id)
     if usage.changes_since(session, key_id, CHANGES, now() - DAY) >= most:
-        what = "changes of materials, sensors and stored logs in the last 24 hours"
+        what = "changes of materials, sensors and stored logs, and fits, in the last 24 hours"
         raise _exceeded(what, most, "STICTION_KEY_CHANGES_A_DAY", LOGS_RETRY_SECONDS)
 
 

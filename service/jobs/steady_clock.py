@@ -51,7 +51,7 @@ class SteadyClock:
         """Whether it has been steady for long enough while a server looked, none of them for longer than ``STEADY``
         apart.
         """
-        look = Look(now(), time.monotonic())
+        look = Look(now(), _unset_clock())
         with self._database.write(durable=False) as session:
             seen = stores.seen_clock(session, lock=True) or SeenClock(look.at, 0.0)
             last = self._last if self._last and self._last.at == seen.at else None  # else others looked meanwhile
@@ -64,6 +64,11 @@ class SteadyClock:
             stores.note_clock(session, seen)
         self._last = look
         return seen.steady >= STEADY.total_seconds()
+
+
+def _unset_clock() -> float:
+    """s of the clock that nobody sets, which goes on while the machine is asleep where the system has such a one."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
 def _jump(seen: SeenClock, last: Look | None, look: Look) -> timedelta | None:

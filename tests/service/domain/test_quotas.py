@@ -102,7 +102,7 @@ def test_bytes_of_a_key_are_those_of_files_that_are_there(keys: Database) -> Non
     assert refusal.value.allowed == "less than 2000 (STICTION_KEY_STORED_BYTES), before another log"
 
 
-@pytest.mark.parametrize("action", ["material.created", "grasp_log.withdrawn", "sensor.described"])
+@pytest.mark.parametrize("action", ["material.created", "grasp_log.withdrawn", "sensor.described", "fit.requested"])
 def test_changes_of_a_key_are_counted_for_a_day_and_what_takes_away_is_none(
     keys: Database, action: AuditAction
 ) -> None:
@@ -125,6 +125,6 @@ def test_changes_of_a_key_are_counted_for_a_day_and_what_takes_away_is_none(
         quotas.check_change(session, Settings(), KEY)
         with pytest.raises(QuotaExceeded) as refusal:
             quotas.check_change(session, Settings(key_changes_a_day=2), KEY)
-    told = "changes of materials, sensors and stored logs in the last 24 hours of this key are 2; allowed: 2"
+    told = "changes of materials, sensors and stored logs, and fits, in the last 24 hours of this key are 2; allowed: 2"
     assert str(refusal.value) == f"{told} (STICTION_KEY_CHANGES_A_DAY)"
     assert refusal.value.retry_seconds == 3600

@@ -156,12 +156,13 @@ CHANGES: tuple[tuple[str, str, dict[str, Any] | None], ...] = (
     ("PUT", "/v1/materials/paper/aliases/A4", None),
     ("PUT", "/v1/materials/paper/owners/group:lab", None),
     ("PUT", "/v1/sensors/finger", {"young_modulus": 2.5e5, "poisson_ratio": 0.48}),
+    ("POST", "/v1/materials/paper/fits", {"method": "ols"}),
 )
 
 
 @ONLY_SQLITE
 @pytest.mark.parametrize(
-    ("method", "path", "body"), CHANGES, ids=["material", "description", "alias", "owner", "sensor"]
+    ("method", "path", "body"), CHANGES, ids=["material", "description", "alias", "owner", "sensor", "fit"]
 )
 def test_a_key_that_has_changed_as_much_as_it_may_changes_no_more(
     reach: Callable[..., Any], key: str, method: str, path: str, body: dict[str, Any] | None

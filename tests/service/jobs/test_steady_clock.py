@@ -16,20 +16,27 @@ BEGIN = datetime(2026, 11, 26, tzinfo=UTC)
 
 
 class Clocks:
-    """The clock that somebody may set, and the one that nobody does, s."""
+    """The clock that somebody may set, and those that nobody does, s: one stands still while the machine sleeps."""
+
+    CLOCK_BOOTTIME = 7
 
     def __init__(self) -> None:
-        self.wall, self.monotonic_ = BEGIN, 1000.0
+        self.wall, self.since_start, self.awake = BEGIN, 1000.0, 1000.0
 
-    def go(self, passed: timedelta, set_by: timedelta = timedelta()) -> None:
+    def go(self, passed: timedelta, set_by: timedelta = timedelta(), asleep: timedelta = timedelta()) -> None:
         self.wall += passed + set_by
-        self.monotonic_ += passed.total_seconds()
+        self.since_start += passed.total_seconds()
+        self.awake += (passed - asleep).total_seconds()
 
     def now(self) -> datetime:
         return self.wall
 
+    def clock_gettime(self, clock: int) -> float:
+        assert clock == self.CLOCK_BOOTTIME
+        return self.since_start
+
     def monotonic(self) -> float:
-        return self.monotonic_
+        return self.awake
 
 
 @pytest.fixture
@@ -63,7 +70,7 @@ def log_of(store: Database, clocks: Clocks) -> str:
     """A log that comes in now."""
     with store.write() as session:
         log_id = grasp_logs.add(
-            session, NewGraspLog(f"{clocks.monotonic_:064.0f}", 1, "npz", "x", None, "s", 2, 1.0, (2, 2))
+            session, NewGraspLog(f"{clocks.since_start:064.0f}", 1, "npz", "x", None, "s", 2, 1.0, (2, 2))
         )
         own = update(GraspLogRow).where(GraspLogRow.id == log_id)
         session.execute(own.values(created_at=clocks.wall, file_since=clocks.wall))
@@ -96,6 +103,25 @@ def test_a_clock_that_is_set_by_seconds_is_believed(store: Database, clocks: Clo
     for step in (0.0, 5.0, -5.0, 30.0):
         clocks.go(LOOK, timedelta(seconds=step))
         assert clock.is_believed()
+
+
+NIGHT = timedelta(hours=8)
+
+
+def test_a_machine_that_sleeps_at_night_believes_its_clock(store: Database, clocks: Clocks) -> None:
+    """Each wake had been a jump, after which nothing went by age for a day."""
+    clock = believed(SteadyClock(store), clocks)
+    clocks.go(NIGHT, asleep=NIGHT)
+    assert clock.is_believed()
+
+
+def test_without_a_clock_that_goes_on_asleep_a_night_is_a_jump(
+    store: Database, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(Clocks, "CLOCK_BOOTTIME")
+    clock = believed(SteadyClock(store), clocks)
+    clocks.go(NIGHT, asleep=NIGHT)
+    assert not clock.is_believed()
 
 
 @pytest.mark.parametrize("by", DAYS[:2])
