@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from service import formats
 from service.cli.sources import found
 
 
@@ -19,3 +20,32 @@ def test_a_folder_of_hidden_files_alone_is_refused(tmp_path: Path) -> None:
     (tmp_path / ".hidden.npz").touch()
     with pytest.raises(typer.BadParameter, match="has no files in it"):
         found([tmp_path], None)
+
+
+def test_what_is_named_comes_in_its_order_and_a_recording_is_one_log(tmp_path: Path) -> None:
+    for folder, name in (("bag", "metadata.yaml"), ("tac", "index.npy"), ("logs", "1.npz")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / name).touch()
+        (tmp_path / folder / "more.txt").touch()
+    (tmp_path / "alone.npz").touch()
+    named = [tmp_path / name for name in ("logs", "bag", "alone.npz", "tac", "absent.npz")]
+    told = [source.name for source in found(named, None)]
+    assert told == ["1.npz", "more.txt", "bag", "alone.npz", "tac", "absent.npz"]
+
+
+def test_a_file_is_handed_on_as_it_is_with_its_mapping(tmp_path: Path) -> None:
+    (tmp_path / "mapping.json").write_text('{"time": "t", "displacement": "u"}')
+    (source,) = found([tmp_path / "a.npz"], tmp_path / "mapping.json")
+    path, mapping = source.log()
+    assert path == tmp_path / "a.npz"
+    assert mapping is not None
+    assert (mapping["time"], mapping["displacement"]) == ("t", "u")
+    assert found([tmp_path / "a.npz"], None)[0].log() == (tmp_path / "a.npz", None)
+
+
+def test_a_log_is_read_here_where_its_rest_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(formats, "read", lambda path, **given: asked.append((path, given)))
+    (source,) = found([tmp_path / "a.npz"], None, scale=2.0, rest=tmp_path / "rest.npz")
+    assert source.log()[1] is None
+    assert asked == [(tmp_path / "a.npz", {"mapping": None, "scale": 2.0, "rest": tmp_path / "rest.npz"})]

@@ -47,7 +47,7 @@ def test_a_pose_errs_as_much_by_turning_at_3_mm(log: GraspLog) -> None:
 
 
 def test_correlated_noise_is_as_large_from_the_first_frame_and_remembers(log: GraspLog) -> None:
-    noise = seen(faults.correlated(1e-5, memory=0.9), log).displacement - log.displacement
+    noise = seen(faults.correlated(1e-5), log).displacement - log.displacement
     assert noise[0].std() == pytest.approx(1e-5, rel=0.2)
     assert noise.std() == pytest.approx(1e-5, rel=0.05)
     assert (noise[1:] * noise[:-1]).mean() / noise.var() == pytest.approx(0.9, abs=0.02)

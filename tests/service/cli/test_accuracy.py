@@ -1,0 +1,52 @@
+"""What accuracy costs, as a command tells it."""
+
+import json
+import math
+from contextlib import nullcontext
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import pytest
+
+from service.cli import accuracy
+from service.report.work_precision import Setting, WorkPrecision
+from tests.service.report.test_material import MODEL
+
+FOUND = WorkPrecision(
+    "a scene",
+    "of the ratio",
+    (Setting("a", 1.0, 0.25, "quick"), Setting("b", 2.0, 0.5, "beaten"), Setting("c", 3.0, math.nan)),
+)
+
+
+def test_what_is_worth_asking_for_is_starred_and_no_error_is_no_number(capsys: pytest.CaptureFixture[str]) -> None:
+    accuracy._tell([FOUND], None, json=False)
+    title, head, _, *rows = capsys.readouterr().out.splitlines()
+    assert (title, head.split()) == ("a scene; error: of the ratio", ["worth", "it", "ask", "for", "seconds", "error"])
+    assert [row.split() for row in rows] == [
+        ["*", "a", "1.00", "0.250", "quick"],
+        ["b", "2.00", "0.500", "beaten"],
+        ["*", "c", "3.00", "–"],
+    ]
+
+
+def test_a_program_is_told_all_settings_and_null_for_no_error(capsys: pytest.CaptureFixture[str]) -> None:
+    accuracy._tell([FOUND], None, json=True)
+    (told,) = json.loads(capsys.readouterr().out)["subjects"]
+    assert (told["subject"], told["error"]) == ("a scene", "of the ratio")
+    assert told["settings"][1] == {"ask": "b", "seconds": 2.0, "error": 0.5, "told": "beaten", "worth_asking": False}
+    assert (told["settings"][2]["error"], told["settings"][2]["worth_asking"]) == (None, True)
+
+
+def test_the_models_of_a_material_are_asked_for_in_the_order_of_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = {"ols": MODEL, "hierarchical": MODEL}
+    client = Mock(material=Mock(return_value=SimpleNamespace(models=models)), model=Mock(return_value=MODEL))
+    monkeypatch.setattr(accuracy, "connected", lambda *_: nullcontext(client))
+    found = accuracy._of_material("paper", "http://there", None)
+    assert [call.args for call in client.model.call_args_list] == [("paper", "hierarchical"), ("paper", "ols")]
+    assert found.subject == "paper"
+
+
+@pytest.mark.parametrize(("text", "is_scene"), [("a.toml", True), ("lifting_15N", True), ("a.npz", False)])
+def test_a_scene_is_known_by_its_ending_or_its_name(text: str, is_scene: bool) -> None:
+    assert accuracy._is_scene(text) is is_scene

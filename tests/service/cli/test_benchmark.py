@@ -1,0 +1,28 @@
+"""What commands of the slip benchmark print of what was run."""
+
+import pytest
+
+from service.cli import benchmark
+from service.slip_benchmark.running import PredictionRun
+
+Capture = pytest.CaptureFixture[str]
+
+
+def test_predictions_are_counted_by_method_in_the_order_in_which_they_ran(capsys: Capture) -> None:
+    ran = [
+        PredictionRun("mine", "0000", 1.25, None),
+        PredictionRun("filter", "0000", 0.5, None),
+        PredictionRun("mine", "0001", 2.0, "no\x1b[2J"),
+        PredictionRun("mine", "0002", 2.0, "no\x1b[2J"),
+    ]
+    benchmark._print_run(ran, 3)
+    title, _, _, first, second, *reasons = capsys.readouterr().out.splitlines()
+    assert (title, first.split(), second.split()) == (
+        "Predictions", ["mine", "1", "of", "3", "5.2"], ["filter", "1", "of", "3", "0.5"]
+    )  # fmt: skip
+    assert reasons == ["mine: no�[2J"]
+
+
+def test_the_first_twenty_reasons_are_named(capsys: Capture) -> None:
+    benchmark._print_run([PredictionRun("mine", f"{k:04d}", 0.0, f"reason {k}") for k in range(25)], 25)
+    assert capsys.readouterr().out.splitlines()[4:] == [f"mine: reason {k}" for k in range(20)]

@@ -1,0 +1,99 @@
+"""What commands on sensors send to a service, write and tell, without one."""
+
+import json
+from contextlib import nullcontext
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+from typer import BadParameter
+
+from service.cli import main, sensors
+from slipcore import forces
+from slipcore.forces import Gel
+
+Capture = pytest.CaptureFixture[str]
+CROSSTALK = {
+    "name": "crosstalk_x", "unit": "-", "value": 0.08, "low": 0.07, "high": 0.09, "not_identified": None
+}  # fmt: skip
+GAIN = CROSSTALK | {"name": "gain", "value": None, "not_identified": "no total force is known"}
+TOLD = {"estimates": [CROSSTALK, GAIN]}
+
+
+@pytest.fixture
+def client(monkeypatch: pytest.MonkeyPatch) -> Mock:
+    told = Mock()
+    told.upload.side_effect = [SimpleNamespace(id=name, sensor="left") for name in "ab"]
+    told.calibrate_sensor.return_value = TOLD | {"version": 3}
+    monkeypatch.setattr(sensors, "connected", lambda *_: nullcontext(told))
+    monkeypatch.setattr(sensors, "_learnt", lambda *_: TOLD)
+    return told
+
+
+def run(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as ending:
+        main(["sensors", *arguments])
+    return int(ending.value.code or 0)
+
+
+def test_each_log_of_a_calibration_is_sent_with_its_own_force(client: Mock, capsys: Capture) -> None:
+    assert run("calibrate", "1.npz", "2.npz", "--known-force", "2", "--known-force", "3", "--store") == 0
+    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": None}] * 2
+    client.calibrate_sensor.assert_called_once_with("left", {"a": 2.0, "b": 3.0})
+    title, _, _, *rows = capsys.readouterr().out.splitlines()
+    assert title == "Calibration by 2 logs, version 3"
+    assert [" ".join(row.split()) for row in rows] == [
+        "crosstalk_x [-] 0.0800 0.0700 … 0.0900",
+        "gain [-] not identified no total force is known",
+    ]
+
+
+def test_forces_that_nobody_measured_are_not_known_to_the_service(client: Mock) -> None:
+    assert run("calibrate", "1.npz", "2.npz", "--store", "--sensor", "right") == 0
+    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": "right"}] * 2
+    client.calibrate_sensor.assert_called_once_with("left", {"a": None, "b": None})
+
+
+def test_a_calibration_of_this_machine_is_written_whole(client: Mock, tmp_path: Path, capsys: Capture) -> None:
+    assert run("calibrate", "1.npz", "--output", str(tmp_path / "model.json"), "--json") == 0
+    assert json.loads((tmp_path / "model.json").read_text(encoding="utf-8")) == TOLD
+    assert json.loads(capsys.readouterr().out) == TOLD
+    client.upload.assert_not_called()
+    for more in (["--output", "x.json"], ["--mapping", "x.json"]):
+        assert run("calibrate", "1.npz", "--store", *more) == 2
+
+
+@pytest.mark.parametrize(("thickness", "told"), [(1.0, 1.0), (1.001, None), (4e-3, 4e-3)])
+def test_a_gel_that_is_thicker_than_a_metre_is_a_half_space_to_the_service(
+    client: Mock, monkeypatch: pytest.MonkeyPatch, capsys: Capture, thickness: float, told: float | None
+) -> None:
+    gel = Gel(2e5, 0.48, thickness)
+    estimates = [
+        {"name": "thickness", "unit": "m", "value": 4e-3, "low": 3e-3, "high": 5e-3, "information": 0.5, "note": ""}
+    ]
+    found: Any = SimpleNamespace(gel=gel, to_json=lambda: {"gel": {"young_modulus": 2e5}, "estimates": estimates})
+    asked = Mock(return_value=found)
+    monkeypatch.setattr(forces, "calibrate_gel", asked)
+    monkeypatch.setattr(sensors, "read_log", lambda *_: SimpleNamespace(sensor="left"))
+    given = ("--known-force", "2", "--young-modulus", "3", "--poisson-ratio", "0.4", "--thickness", "5")
+    assert run("calibrate-gel", "1.npz", *given, "--marker-depth", "0.001", "--noise", "6", "--store") == 0
+    assert asked.call_args.args[1:] == ([2.0], 3.0, 0.4, 5.0, 1e-3, 6.0)
+    client.describe_sensor.assert_called_once_with("left", 2e5, 0.48, told, 1e-3)
+    out = capsys.readouterr().out.splitlines()
+    assert out[0] == "Gel by 1 logs, by which left is described"
+    assert " ".join(out[3].split()) == "thickness [m] 0.004000 0.003000 … 0.005000 50.0%"
+
+
+def test_a_log_without_a_sensor_s_name_needs_one_to_be_stored_by() -> None:
+    assert sensors._sensor_name("mine", "unknown") == "mine"
+    assert sensors._sensor_name(None, "left") == "left"
+    with pytest.raises(BadParameter, match="--store for logs that name no sensor; needed: --sensor"):
+        sensors._sensor_name(None, "unknown")
+
+
+def test_sensors_are_told_to_a_program_as_the_service_has_them(client: Mock, capsys: Capture) -> None:
+    client.sensors.return_value = [{"name": "left", "gel": None}]
+    assert run("list", "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {"sensors": [{"name": "left", "gel": None}]}

@@ -1,0 +1,75 @@
+"""What commands that simulate tell, without simulating."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.cli import simulation
+from service.jobs.campaign import Outcome
+from slipcore import FrictionLaw, GraspLog
+from slipcore.frames import GroundTruth
+
+
+def simulated(ratio: tuple[float, ...] = (math.nan, 1.0, 0.25)) -> GraspLog:
+    """Three frames of two by one elements, pressed with 1 N and 2 N each."""
+    place = np.array([[[0.0, 0.0, 0.0]], [[1e-3, 0.0, 0.0]]])
+    force = np.zeros((3, 2, 1, 3))
+    force[1, ..., 2], force[2, ..., 2] = -1.0, -2.0
+    touched = np.zeros((3, 2, 1), bool)
+    truth = GroundTruth(touched, touched, touched, np.array(ratio), FrictionLaw((0.5, 0.25, -0.125)))
+    metadata = {"tier": "beams", "seconds": "1.5", "scene": "a press"}
+    return GraspLog(
+        np.array([2.0, 3.0, 4.5]), place, np.zeros((3, 2, 1, 3)), 1e-6, force=force, truth=truth, metadata=metadata
+    )
+
+
+def test_a_simulated_grasp_is_told_by_what_was_simulated_and_how(capsys: pytest.CaptureFixture[str]) -> None:
+    simulation._print(simulated(), "a press", json=False)
+    assert [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()] == [
+        "a press",
+        "frames 3 of 2 x 1 points in 2.50 s",
+        "normal force 4.00 N at its largest",
+        "stick ratio 0.250 at its smallest",
+        "friction β₀ 0.500, β₁ 0.250 s/m, β₂ −0.125 1/N",
+        "tier beams",
+        "computed in 1.50 s",
+    ]
+    simulation._print(replace(simulated(), metadata={}), "a press", json=False)
+    assert "computed in" not in capsys.readouterr().out
+
+
+def test_a_program_is_told_numbers_and_the_stick_ratio_over_time(capsys: pytest.CaptureFixture[str]) -> None:
+    simulation._print(simulated(), "a press", json=True)
+    assert json.loads(capsys.readouterr().out) == {
+        "tier": "beams", "seconds": "1.5", "scene": "a press", "frames": 3, "points": "2 x 1", "duration_s": 2.5,
+        "largest normal force_N": 4.0, "smallest stick ratio": 0.25, "friction": [0.5, 0.25, -0.125],
+        "time": [2.0, 3.0, 4.5], "stick_ratio": [None, 1.0, 0.25],
+    }  # fmt: skip
+
+
+def test_a_grasp_that_never_touches_has_no_stick_ratio() -> None:
+    assert simulation._summary(simulated((math.nan,) * 3))["smallest stick ratio"] is None
+
+
+def test_logs_of_a_campaign_are_told_in_order_with_what_was_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = Path("there")
+    made = [
+        Outcome("pull", 0, folder / "pull-0.npz", "too fast"),
+        Outcome("press", 10, folder / "press-10.npz"),
+        Outcome("press", 9, folder / "deep" / "press-9.npz"),
+    ]
+    simulation._print_campaign(made, folder, json=False)
+    title, _, _, *rows = capsys.readouterr().out.splitlines()
+    assert title == "there"
+    assert [row.strip().split(maxsplit=2) for row in rows] == [
+        ["press", "9", "deep/press-9.npz"],
+        ["press", "10", "press-10.npz"],
+        ["pull", "0", "too fast"],
+    ]
+    simulation._print_campaign(made, folder, json=True)
+    told = json.loads(capsys.readouterr().out)["logs"]
+    assert told[2] == {"scene": "pull", "seed": 0, "path": "there/pull-0.npz", "refused": "too fast"}
