@@ -20,7 +20,8 @@ from stiction_client import (
     required_normal_force,
     sdf_surface,
 )
-from stiction_client.support import BEND, ONE_GRASP, Support, disagreement, kinds, support
+from stiction_client.defaults import BEND
+from stiction_client.support import ONE_GRASP, Support, disagreement, kinds, notes, support, uncertainty
 
 Make = Callable[..., FrictionModel]
 
@@ -187,3 +188,42 @@ def test_what_can_be_relied_on_warns_of_nothing_more() -> None:
     assert Support("supported", "well known").warning(None) is None
     assert Support("extrapolated", "record").warning("outside") == "outside"
     assert Support("stale", "fit").warning("outside", None) == "outside; fit"
+
+
+@pytest.mark.parametrize(("v", "f_n"), [(0.0, 0.1), (3e-3, 0.1), (3e-3, 0.3), (4e-3, 0.002)])
+@pytest.mark.parametrize("array", [False, True])
+def test_how_much_of_friction_is_unknown_is_that_of_the_whole_covariance(
+    make_model: Make, v: float, f_n: float, array: bool
+) -> None:
+    """t · √(xᵀΣx) / xᵀβ with x = (1, v, f_n)."""
+    correlated = np.array([[2e-4, 3e-3, -1e-3], [3e-3, 9.0, 2e-2], [-1e-3, 2e-2, 4e-2]])
+    model = make_model((0.4, -20.0, 0.3), correlated, degrees_of_freedom=7.0)
+    x = np.array([1.0, v, f_n])
+    expected = special.stdtrit(7.0, 0.975) * np.sqrt(x @ correlated @ x) / (x @ model.coefficients)
+    asked = (np.array([v]), np.array([f_n])) if array else (v, f_n)
+    assert np.asarray(uncertainty(model, *asked)).item() == pytest.approx(expected, rel=1e-12)
+
+
+def test_friction_that_is_nothing_beside_its_uncertainty_is_not_known_at_all(make_model: Make) -> None:
+    assert uncertainty(make_model((0.0, 0.0, 0.0)), 0.0, 0.1) == np.inf
+    assert uncertainty(make_model((-0.4, 0.0, 0.0)), 0.0, 0.1) == np.inf
+    assert uncertainty(make_model((0.0, 0.0, 0.0), np.zeros((3, 3))), 0.0, 0.1) == np.inf
+
+
+def test_a_disagreement_is_told_where_it_is_largest(make_model: Make) -> None:
+    exact = np.zeros((3, 3))
+    one = make_model((0.4, 0.0, 0.0), exact)
+    by_force, by_speed = make_model((0.4, 0.0, 0.5), exact), make_model((0.4, 20.0, 0.0), exact)
+    told = disagreement("ols", one, {"bayes": by_force})
+    assert told is not None
+    assert "bayes expects 0.55 ± 0, ols 0.4 ± 0 at 0 m/s and 0.3 N an element; look at the samples" in told
+    told = disagreement("ols", one, {"same": one, "bayes": by_speed})
+    assert told is not None
+    assert "bayes expects 0.48 ± 0, ols 0.4 ± 0 at 0.004 m/s and 0.002 N an element" in told
+    assert disagreement("ols", one, {"same": one}) is None
+    assert disagreement("ols", one, {}) is None
+
+
+def test_notes_come_in_the_order_of_what_weighs_most() -> None:
+    told = {"unnoticed_change": "e", "weakening": "a", "same_grasps": "b", "sensor_gain": "", "element_areas": "d"}
+    assert notes(told | {"others_calibrations": "c", "rank": 3.0}) == ("a", "b", "c", "d", "e")

@@ -78,3 +78,11 @@ def test_a_fall_of_one_sensor_alone_is_told_with_its_name() -> None:
 def test_a_first_fit_has_nothing_to_compare_with() -> None:
     models = [estimators.fit(list(logs([0.0, -0.4]).values()), method="hierarchical")]
     assert with_weakening(models, {}, logs([0.0, -0.4]), PRIOR) == models
+
+
+def test_no_log_is_named_where_two_fell_as_much() -> None:
+    """Without either the other one still lowers what a planner may count on."""
+    before = fitted(logs([0.0] * 5))
+    model = fitted(logs([0.0] * 5 + [-0.4, -0.4]), before)[0]
+    assert model.notes == ()
+    assert LOG not in model.diagnostics

@@ -1,0 +1,62 @@
+"""What callers may pass: a number, or many, within their range."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stiction_client import InvalidArgument
+from stiction_client.arguments import within
+
+
+@pytest.mark.parametrize("value", [1, 1.0, np.float64(1.0), np.int32(1), np.array(1.0), np.float32(1.0)])
+def test_one_number_comes_back_as_a_float(value: Any) -> None:
+    found = within("load", value, 0.0, 2.0)
+    assert (type(found), found) == (float, 1.0)
+
+
+def test_many_come_back_in_their_shape() -> None:
+    found = within("load", [[0, 1], [2, 1]], 0.0, 2.0)
+    assert isinstance(found, np.ndarray)
+    assert found.dtype == np.float64
+    assert found.tolist() == [[0.0, 1.0], [2.0, 1.0]]
+    assert np.shape(within("load", [], 0.0, 2.0)) == (0,)
+
+
+@pytest.mark.parametrize("value", [0.0, 2.0, [0.0, 2.0]])
+def test_the_ends_of_the_range_are_in_it(value: Any) -> None:
+    assert np.array_equal(within("load", value, 0.0, 2.0), value)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (-1e-9, "-1e-09"),
+        (2.5, "2.5"),
+        (3, "3"),
+        (np.nan, "nan"),
+        (np.inf, "inf"),
+        ([1.0, 2.5, -1.0], "2.5"),
+        (np.array(-1), "-1.0"),
+        (2**60, "1.152921504606847e.18"),
+    ],
+)
+def test_what_is_beyond_is_told_with_the_range_and_its_unit(value: Any, shown: str) -> None:
+    with pytest.raises(InvalidArgument, match=rf"^load is {shown}; allowed: 0 to 2 N$"):
+        within("load", value, 0.0, 2.0, "N")
+    with pytest.raises(InvalidArgument, match=r"allowed: 0 to 2$"):
+        within("load", value, 0.0, 2.0)
+
+
+@pytest.mark.parametrize("value", ["1", None, True, [True], 1j, [1.0, "2"], [None], "x" * 100])
+def test_what_is_no_number_is_told_as_such(value: Any) -> None:
+    with pytest.raises(InvalidArgument) as refusal:
+        within("load", value, 0.0, 2.0, "N")
+    assert refusal.value.allowed == "numbers: 0 to 2 N"
+    assert refusal.value.value == repr(value)[:60]
+
+
+@pytest.mark.parametrize(("value", "is_exact"), [(2**53 - 1, True), (2**53 + 1, False)])
+def test_whole_numbers_beyond_those_of_a_float_are_rounded(value: int, is_exact: bool) -> None:
+    found = within("count", value, 0.0, 1e300)
+    assert (int(found) == value) is is_exact
