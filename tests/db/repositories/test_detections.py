@@ -60,7 +60,9 @@ def test_a_log_has_samples_once_it_has_one_and_a_material_while_one_counts(
             logs.append(grasp_logs.add(session, new_log(paper)))
             jobs.add(session, "ingest", "ols", material_id=paper, grasp_log_id=logs[-1])
             assert not detections.has_samples(session, logs[-1])
-            detections.add(session, logs[-1], detection, replace(samples, count=count, none_because=None if count else "none"))
+            detections.add(
+                session, logs[-1], detection, replace(samples, count=count, none_because=None if count else "none")
+            )
             assert detections.has_samples(session, logs[-1]) is (count == 1)
             assert detections.any_samples(session, paper) is (count == 1)
         grasp_logs.withdraw(session, logs[1], "wrong")
@@ -70,5 +72,6 @@ def test_a_log_has_samples_once_it_has_one_and_a_material_while_one_counts(
         told = [grasp_logs.get(session, each).samples for each in logs]
         assert [each and each.moments for each in told] == [b"moments", b"new"]
         detections.remove(session, logs[1])
-        assert grasp_logs.get(session, logs[1]).samples is grasp_logs.get(session, logs[1]).detection is None
+        assert grasp_logs.get(session, logs[1]).samples is None
+        assert grasp_logs.get(session, logs[1]).detection is None
         assert grasp_logs.get(session, logs[0]).samples is not None
