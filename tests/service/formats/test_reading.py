@@ -340,3 +340,21 @@ def test_who_loses_a_reader_does_not_take_the_one_that_another_key_has_warm(
         assert len(executors) == 3, "as many as may be: the fourth takes one that is warm"
 
     with_readers(60.0, lose)
+
+
+@pytest.mark.parametrize("cpu", [0.06, 0.0])
+def test_a_file_is_waited_for_as_long_as_it_may_take_and_no_longer(monkeypatch: pytest.MonkeyPatch, cpu: float) -> None:
+    """By CPU, or by four times as long of the clock; what nobody waits for any more is not begun."""
+    looks = iter([1.0, *[1.0 + cpu] * 1000])
+    monkeypatch.setattr(reading, "_cpu_seconds", lambda _: next(looks))
+
+    async def wait() -> asyncio.Future[int]:
+        never: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        with pytest.raises(TimeoutError if cpu else QueueFull):
+            await reading._within(0.05, never, 7)
+        done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        done.set_result(3)
+        assert await reading._within(0.05, done, 7) == 3
+        return never
+
+    assert asyncio.run(wait()).cancelled()

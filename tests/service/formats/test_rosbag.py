@@ -1,11 +1,16 @@
 """Storage files of a recording: in their order, and as many as may be."""
 
+import json
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from service.formats import rosbag
+from service.formats.mapping import parse
+from slipcore import GraspLog
 from slipcore.errors import InvalidInput
 
 
@@ -54,3 +59,15 @@ def test_nobody_is_told_where_a_damaged_file_lies(tmp_path: Path) -> None:
     assert str(refusal.value) == told
     with pytest.raises(OSError, match="full"), rosbag._library("rosbag1", tmp_path):
         raise OSError(28, "full")
+
+
+@pytest.mark.parametrize("form", ["bag1", "bag2"])
+def test_a_bag_is_read_as_its_ros_writes_it(
+    robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path, form: str
+) -> None:
+    path = getattr(write, form)(robot_log, tmp_path / "grasp.bag")
+    read = {"bag1": rosbag.read_bag1, "bag2": rosbag.read_bag2}[form]
+    log = read(path, parse(json.dumps(write.mapping)))
+    assert np.allclose(log.displacement, robot_log.displacement, rtol=1e-12, atol=0.0)
+    with pytest.raises(InvalidInput, match="displacement is not there"):
+        read(path)

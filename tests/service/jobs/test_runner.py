@@ -564,3 +564,21 @@ def test_short_jobs_that_were_there_first_are_begun_when_a_long_one_takes_the_ex
 
     working(held.do, meanwhile, workers=1, short_executor=held.short_executor, poll_seconds=60.0, lease_seconds=600.0)
     assert held.short_executor.started == 1
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_the_runner_that_was_there_first_leads_the_others_and_then_the_next_one(database: Database) -> None:
+    async def live() -> None:
+        options: Any = {"attempts": 1, "lease_seconds": 60.0, "poll_seconds": 60.0, "shutdown_seconds": 0.0}
+        first, second = (JobRunner(database, [ThreadExecutor(lambda _: None)], **options) for _ in range(2))
+        assert not first.leads  # before it is known
+        for runner in (first, second):
+            await runner.start()
+            await asyncio.to_thread(runner._beat_once)
+        assert (first.leads, second.leads) == (True, False)
+        await first.stop()
+        await asyncio.to_thread(second._beat_once)
+        assert second.leads
+        await second.stop()
+
+    asyncio.run(live())
