@@ -117,19 +117,19 @@ def withdraw_before(
 ) -> list[str]:
     """Take all logs of a material that came before one, or all there are, out of the fits; returns which.
 
-    Raises ``NotFound`` where the one is no log of the material.
+    In one statement, since others who write wait, and there may be tens of thousands. Raises ``NotFound`` where the one
+    is no log of the material.
     """
-    query = select(GraspLogRow).where(GraspLogRow.material_id == material_id)
+    of_material = GraspLogRow.material_id == material_id
+    change = update(GraspLogRow).where(of_material, GraspLogRow.withdrawn_at.is_(None))
     if first_id is not None:
-        first = session.scalar(query.where(GraspLogRow.id == first_id))
+        first = session.scalar(select(GraspLogRow).where(of_material, GraspLogRow.id == first_id))
         if first is None:
             raise NotFound("grasp log", first_id)
-        query = query.where(tuple_(GraspLogRow.number, GraspLogRow.id) < (first.number, first.id))
-    rows = session.scalars(query.where(GraspLogRow.withdrawn_at.is_(None)).with_for_update()).all()
-    for row in rows:
-        row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = now(), because, by
-    session.flush()
-    return [row.id for row in rows]
+        change = change.where(tuple_(GraspLogRow.number, GraspLogRow.id) < (first.number, first.id))
+    change = change.values(withdrawn_at=now(), withdrawn_because=because, withdrawn_by=by)
+    found = change.returning(GraspLogRow.id).execution_options(synchronize_session=False)
+    return list(session.scalars(found))
 
 
 def restore(session: Session, log_id: str) -> bool:

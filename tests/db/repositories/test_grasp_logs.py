@@ -300,6 +300,23 @@ def test_no_clock_that_is_set_moves_the_order_of_logs(
         assert set(grasp_logs.withdraw_before(session, paper, late, "new lot")) == {ahead, early}
 
 
+def test_an_epoch_takes_all_logs_out_in_one_statement(
+    database: Database, new_log: Callable[..., NewGraspLog], statements: list[str]
+) -> None:
+    """20,000 logs, one by one, had taken 0.9 s of CPU, for which all others who write wait."""
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+        logs = [grasp_logs.add(session, new_log(paper)) for _ in range(5)]
+        grasp_logs.withdraw(session, logs[0], "torn")
+    statements.clear()
+    with database.write() as session:
+        assert set(grasp_logs.withdraw_before(session, paper, None, "new lot")) == set(logs[1:])
+    assert not statements  # none is read before
+    with database.read() as session:
+        query = select(GraspLogRow.withdrawn_because).order_by(GraspLogRow.number)
+        assert list(session.scalars(query)) == ["torn"] + 4 * ["new lot"]
+
+
 @pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 def test_the_newest_logs_with_samples_are_found_without_sorting_all(
     database: Database, new_log: Callable[..., NewGraspLog]
