@@ -9,6 +9,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeVar
@@ -18,7 +19,7 @@ from uuid import uuid4
 import httpx
 import numpy as np
 
-from stiction_client import container, problems
+from stiction_client import container, problems, recorded
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
     ConnectionFailed,
@@ -201,13 +202,18 @@ def _listed(
     while True:
         limit = int(min(PAGE, most - len(found)))
         answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
-        page, cursor = _record(lambda record: ([read(item) for item in record["items"]], record.get("next")), answer)
+        page, cursor = _record(lambda record: ([read(item) for item in record["items"]], _next(record)), answer)
         found += page
         if cursor is None or len(found) >= most:
             return found
         if not page or cursor in known:
             raise UnexpectedAnswer(f"the service's list at {path} does not end")
         known.add(cursor)
+
+
+def _next(record: Mapping[str, Any]) -> str | None:
+    cursor = record.get("next")
+    return None if cursor is None else recorded.text("next", cursor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -492,7 +498,7 @@ def _refuse(response: httpx.Response) -> NoReturn:
 def _record(read: Callable[[Any], T], record: Any) -> T:
     try:
         return read(record)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise UnexpectedAnswer(f"the service's answer lacks or garbles {error}") from error
 
 
@@ -526,13 +532,17 @@ def _require_same(asked: Mapping[str, str | float], answer: Any) -> None:
     """Raise ``UnexpectedAnswer`` where what an answer says it was asked is not what was sent."""
     for name, value in asked.items():
         answered = getattr(answer, name)
-        sent = float(str(value)) if isinstance(answered, int | float) else value  # as the address has it
+        sent = value
+        if isinstance(answered, int | float):
+            with suppress(ValueError):
+                sent = float(str(value))  # as the address has it
         if answered != sent and (name, value) != ("method", "auto"):
             raise UnexpectedAnswer(f"the answer is to another question: its {name} is {answered!r}, asked {sent!r}")
 
 
 def _summary(response: httpx.Response) -> str:
-    return f"{response.request.url} answered {response.status_code} with {response.text[:80]!r}"
+    begin = response.content[:80].decode(errors="replace")  # whatever charset it says it has
+    return f"{response.request.url} answered {response.status_code} with {begin!r}"
 
 
 def _body(log: GraspLogLike | Path | str) -> tuple[bytes, str]:

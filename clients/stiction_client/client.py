@@ -1,10 +1,11 @@
 """The two clients, one waiting and one awaiting: they carry out what ``calls`` describes."""
 
 import asyncio
+import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import aclosing, closing, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,20 +15,26 @@ import httpx
 from stiction_client import calls
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
-from stiction_client.errors import ConnectionFailed, InvalidArgument
+from stiction_client.errors import ConnectionFailed, InvalidArgument, UnexpectedAnswer
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 
 TIMEOUT = 30.0
-"""s for one request; an upload at the service's size limit takes a second on a local network."""
+"""s to wait for more of a request to leave or for an answer to begin, and until that is whole."""
 
 CONNECT_TIMEOUT = 5.0
 """s; a host that doesn't answer by then isn't there."""
 
 JOB_TIMEOUT = 300.0
 """s; a fit of 200,000 samples takes seconds, a queue before it may take minutes."""
+
+MOST_ANSWER_BYTES = 2**26
+"""Bytes of an answer once it is unpacked; a page of a list has some MB."""
+
+ENCODINGS = ("", "identity", "gzip")
+"""How an answer may be packed: others unpack a few bytes to gigabytes at once."""
 
 SHOWN_URL = 80
 """Characters of an address that an error shows."""
@@ -37,8 +44,9 @@ class FrictionClient:
     """A Stiction service over one kept-open connection; use it as a context manager, or ``close`` it.
 
     ``url`` and ``key``, sent as ``Authorization: Bearer``, are by default those of the environment, ``STICTION_URL``
-    and ``STICTION_KEY``, or this machine's service without a key; ``timeout`` s holds for one request; ``transport``
-    replaces the network, as in tests. Where the connection breaks or the service is busy or away (429; 502, 503, 504),
+    and ``STICTION_KEY``, or this machine's service without a key; ``timeout`` s holds for each wait; ``transport``
+    replaces the network, as in tests. An answer is whole ``timeout`` s after its head, or it counts as a broken
+    connection, and has 64 MiB at most. Where the connection breaks or the service is busy or away (429; 502, 503, 504),
     a request is tried three times, not before the service asks for it; the service does it once: what would be done
     again is tried again only where it was not done (429, 503). Models are kept: one younger than ``stale_after`` s
     isn't asked for again, an older one isn't sent again unless it changed, and where the service can't be reached, or a
@@ -277,7 +285,12 @@ class FrictionClient:
             time.sleep(step.seconds)
             return None
         try:
-            return self._http.send(_http_request(self._http, step))
+            answer = self._http.send(_http_request(self._http, step), stream=True)
+            with closing(answer):
+                content = _Content(answer)
+                for part in answer.iter_bytes():
+                    content.add(part)
+            return content.whole()
         except httpx.RequestError as error:
             return _broken(step, error)
 
@@ -485,9 +498,45 @@ class AsyncFrictionClient:
             await asyncio.sleep(step.seconds)
             return None
         try:
-            return await self._http.send(_http_request(self._http, step))
+            answer = await self._http.send(_http_request(self._http, step), stream=True)
+            async with aclosing(answer):
+                content = _Content(answer)
+                async for part in answer.aiter_bytes():
+                    content.add(part)
+            return content.whole()
         except httpx.RequestError as error:
             return _broken(step, error)
+
+
+class _Content:
+    """The content of an answer as it comes, within bounds, whoever answers.
+
+    Raises ``UnexpectedAnswer`` for more than a service says, and ``httpx.ReadTimeout`` for what takes too long.
+    """
+
+    def __init__(self, answer: httpx.Response) -> None:
+        self._answer = answer
+        self._content = bytearray()
+        seconds = answer.request.extensions["timeout"]["read"]
+        self._deadline = math.inf if seconds is None else time.monotonic() + seconds
+        encoding = answer.headers.get("content-encoding", "").strip().lower()
+        if encoding not in ENCODINGS:
+            raise UnexpectedAnswer(f"{answer.request.url} answered in content encoding {encoding!r}; asked for: gzip")
+
+    def add(self, part: bytes) -> None:
+        self._content += part
+        request = self._answer.request
+        if len(self._content) > MOST_ANSWER_BYTES:
+            raise UnexpectedAnswer(f"{request.url} answered with more than {MOST_ANSWER_BYTES} bytes")
+        if time.monotonic() > self._deadline:
+            raise httpx.ReadTimeout("the answer began, and was not whole in time", request=request)
+
+    def whole(self) -> httpx.Response:
+        """The answer with its content, unpacked."""
+        headers = self._answer.headers.copy()
+        headers.pop("content-encoding", None)
+        status, content = self._answer.status_code, bytes(self._content)
+        return httpx.Response(status, headers=headers, content=content, request=self._answer.request)
 
 
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
@@ -501,7 +550,7 @@ def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]
         base_url = httpx.URL(url)
     return {
         "base_url": base_url,
-        "headers": {"Authorization": f"Bearer {key}"} if key else {},
+        "headers": {"Accept-Encoding": "gzip"} | ({"Authorization": f"Bearer {key}"} if key else {}),
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
 

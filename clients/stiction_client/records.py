@@ -32,7 +32,7 @@ class Material:
         models = {method: FrictionModel.from_json(model) for method, model in record["models"].items()}
         best = record.get("recommended", {"method": "ols"})  # an older service recommends none
         return cls(
-            name=record["name"],
+            name=recorded.text("name", record["name"]),
             description=record["description"],
             created_at=record["created_at"],
             grasp_logs=int(record["grasp_logs"]),
@@ -256,8 +256,14 @@ class NextGrasp:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "NextGrasp":
-        """The grasp in the service's answer."""
-        return cls(**_values(cls, record))
+        """The grasp in the service's answer; raises ``ValueError`` for numbers that no grasp has."""
+        told = _values(cls, record)
+        told["normal_force"] = recorded.number("normal_force", told["normal_force"], above=0.0)
+        for name in ("slip_length", "speed", "seconds", "uncertainty", "after"):
+            told[name] = recorded.number(name, told[name], least=0.0)
+        for name in ("direction", "conservative_friction"):
+            told[name] = recorded.number(name, told[name])
+        return cls(**told)
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,12 +282,12 @@ class Recognition:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Recognition":
-        """The recognition in the service's answer."""
-        probability = {entry["material"]: float(entry["probability"]) for entry in record["candidates"]}
+        """The recognition in the service's answer; raises ``ValueError`` for what is no probability."""
+        probability = {entry["material"]: _probability(entry["probability"]) for entry in record["candidates"]}
         doubtful = (entry for entry in record["candidates"] if entry.get("support", "supported") != "supported")
         advice = {entry["material"]: f"{entry['support']}: {entry['advice']}" for entry in doubtful}
         methods = {entry["material"]: entry.get("method", record["method"]) for entry in record["candidates"]}
-        return cls(record["method"], probability, float(record["unknown"]), advice, methods)
+        return cls(record["method"], probability, _probability(record["unknown"]), advice, methods)
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,6 +310,13 @@ class AuditEntry:
     def from_json(cls, record: Mapping[str, Any]) -> "AuditEntry":
         """The entry in the service's answer."""
         return cls(**_values(cls, record))
+
+
+def _probability(value: object) -> float:
+    found = recorded.number("probability", value, least=0.0)
+    if found > 1.0 + recorded.ROUNDING:
+        raise ValueError(f"probability, which is {found:g}")
+    return found
 
 
 def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:

@@ -121,10 +121,13 @@ class SlipStream:
     def receive(self, timeout: float = ANSWER_TIMEOUT) -> dict[str, Any]:
         """The next answer: of type "state" (stick_ratio, slip, friction …) or, for a refused frame, "error".
 
-        Raises ``AnswerTimedOut`` after ``timeout`` s.
+        Raises ``AnswerTimedOut`` after ``timeout`` s, and ``UnexpectedAnswer`` for one to no frame that waits for it.
         """
         answer: dict[str, Any] = self._try(lambda: self._read(timeout))
-        self._answered = answer["number"]
+        number = answer.get("number")
+        if not isinstance(number, int) or not self._answered < number < self._number:
+            raise self._unexpected(answer)
+        self._answered = number
         while self._waiting and self._waiting[0][0] <= self._answered:
             self._waiting.popleft()
         return answer
@@ -165,21 +168,25 @@ class SlipStream:
 
     def _finish(self, store: bool) -> dict[str, Any]:
         self._connection.send(msgspec.msgpack.encode({"type": "finish", "store": store}))
-        return self._read(ANSWER_TIMEOUT)
+        answer = self._read(ANSWER_TIMEOUT)
+        if answer.get("type") != "finished" or "grasp_log" not in answer:
+            raise self._unexpected(answer)
+        return answer
 
     def _connect(self, opening: dict[str, Any]) -> ClientConnection:
         try:
             opened = connect(self._url, additional_headers=self._headers, compression=None, max_size=2**22)
             connection = self._open.enter_context(opened)
             connection.send(msgspec.msgpack.encode(opening))
-            answer = msgspec.msgpack.decode(connection.recv(ANSWER_TIMEOUT, decode=False))
+            answer = self._decoded(connection.recv(ANSWER_TIMEOUT, decode=False))
         except ConnectionClosed as error:
             raise _refused(error) from error
         except (OSError, InvalidHandshake) as error:
             raise ConnectionFailed(f"{self._url}: {error}") from error
-        if answer.get("type") != "opened":
-            raise UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
-        self._session = answer["session"]
+        session = answer.get("session")
+        if answer.get("type") != "opened" or not isinstance(session, str):
+            raise self._unexpected(answer)
+        self._session = session
         return connection
 
     def _try(self, do: Any) -> Any:
@@ -203,8 +210,17 @@ class SlipStream:
             content = self._connection.recv(timeout, decode=False)
         except TimeoutError as error:
             raise AnswerTimedOut(f"{self._url}: no answer within {timeout:g} s; the session goes on") from error
-        answer: dict[str, Any] = msgspec.msgpack.decode(content)
-        return answer
+        return self._decoded(content)
+
+    def _decoded(self, content: bytes) -> dict[str, Any]:
+        """A message; raises ``UnexpectedAnswer`` for what is none of a service's."""
+        try:
+            return msgspec.msgpack.decode(content, type=dict[str, Any])
+        except (msgspec.MsgspecError, RecursionError) as error:
+            raise self._unexpected(content) from error
+
+    def _unexpected(self, answer: Any) -> UnexpectedAnswer:
+        return UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
 
 
 def _control(settings: ControlSettings) -> dict[str, Any]:

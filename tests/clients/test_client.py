@@ -1,6 +1,7 @@
+import gzip
 import inspect
 import json
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -122,23 +123,25 @@ def test_friction_is_looked_up_with_what_was_given(ask: Ask, service: Service, a
     assert server.requests[2].url.params["sensor"] == "left"
 
 
+NEXT_GRASP = {
+    "material": "paper",
+    "method": "hierarchical",
+    "version": 3,
+    "normal_force": 0.05,
+    "slip_length": 1e-3,
+    "speed": 2e-3,
+    "direction": 0.9,
+    "seconds": 4.5,
+    "uncertainty": 0.06,
+    "after": 0.04,
+    "conservative_friction": 0.31,
+    "support": "not identified",
+    "advice": "record more grasps",
+}
+
+
 def test_what_to_record_next_is_asked_for(ask: Ask, service: Service) -> None:
-    told = {
-        "material": "paper",
-        "method": "hierarchical",
-        "version": 3,
-        "normal_force": 0.05,
-        "slip_length": 1e-3,
-        "speed": 2e-3,
-        "direction": 0.9,
-        "seconds": 4.5,
-        "uncertainty": 0.06,
-        "after": 0.04,
-        "conservative_friction": 0.31,
-        "support": "not identified",
-        "advice": "record more grasps",
-    }
-    server = service(told)
+    server = service(NEXT_GRASP)
     answer = ask(server, "next_grasp", "paper", 0.05, load=1.0)
     assert server.requests[0].url.path == "/v1/materials/paper/next-grasp"
     asked = {"fn": "0.05", "v": "0.0", "quantile": "0.01", "elements": "60", "load": "1.0", "drop_probability": "0.001"}
@@ -756,3 +759,135 @@ def test_a_list_that_does_not_end_is_left(ask: Ask, service: Service, answers: S
     pages = [{"items": [answers.material] * items, "next": "again"} for _ in range(3)]
     with pytest.raises(UnexpectedAnswer, match="does not end"):
         ask(service(*pages), "materials")
+
+
+@pytest.mark.parametrize("cursor", [{"a": 1}, [1], 3, True])
+def test_a_cursor_that_is_no_text_is_refused(ask: Ask, service: Service, answers: SimpleNamespace, cursor: Any) -> None:
+    with pytest.raises(UnexpectedAnswer, match="next"):
+        ask(service({"items": [answers.material], "next": cursor}), "materials")
+
+
+@pytest.mark.parametrize(
+    ("call", "change"),
+    [("material", {"name": 3.0}), ("material", {"grasp_logs": float("inf")}), ("job", {"id": 3.0})],
+)
+def test_numbers_for_names_and_infinite_counts_are_refused(
+    ask: Ask, answers: SimpleNamespace, call: str, change: dict[str, Any]
+) -> None:
+    content = json.dumps(getattr(answers, call) | change)
+    with pytest.raises(UnexpectedAnswer):
+        ask(lambda _: httpx.Response(200, text=content), call, "paper")
+
+
+@pytest.mark.parametrize("probability", [float("nan"), -0.1, 1.1, True, "0.5", None, 10**400])
+@pytest.mark.parametrize("of", ["paper", "unknown"])
+def test_what_is_no_probability_is_refused(ask: Ask, service: Service, of: str, probability: Any) -> None:
+    """The likeliest material is chosen by it."""
+    told = {"paper": 0.9, "unknown": 0.1} | {of: probability}
+    candidate = {"material": "paper", "version": 3, "probability": told["paper"]}
+    answer = json.dumps({"method": "ols", "candidates": [candidate], "unknown": told["unknown"]})
+    with pytest.raises(UnexpectedAnswer, match="probability"):
+        ask(service(httpx.Response(200, text=answer)), "recognise", "g1")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"normal_force": float("nan")},
+        {"normal_force": 0.0},
+        {"speed": "0.002"},
+        {"slip_length": -1e-3},
+        {"direction": float("inf")},
+        {"seconds": True},
+        {"conservative_friction": None},
+        {"after": []},
+    ],
+)
+def test_what_is_no_grasp_to_record_is_refused(ask: Ask, service: Service, change: dict[str, Any]) -> None:
+    """A robot is to do it."""
+    with pytest.raises(UnexpectedAnswer, match=next(iter(change))):
+        ask(service(httpx.Response(200, text=json.dumps(NEXT_GRASP | change))), "next_grasp", "paper")
+
+
+class Parts(httpx.SyncByteStream, httpx.AsyncByteStream):
+    """Content that comes in parts, without end."""
+
+    def __init__(self, part: Callable[[], bytes]) -> None:
+        self._part, self.count, self.is_closed = part, 0, False
+
+    def __iter__(self) -> Iterator[bytes]:
+        while self.count < 1000:
+            self.count += 1
+            yield self._part()
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        for part in iter(self):
+            yield part
+
+    def close(self) -> None:
+        self.is_closed = True
+
+    async def aclose(self) -> None:
+        self.is_closed = True
+
+
+@pytest.mark.parametrize("status", [200, 409])
+def test_an_answer_without_end_is_left(ask: Ask, status: int) -> None:
+    parts = Parts(lambda: b" " * 2**20)
+    with pytest.raises(UnexpectedAnswer, match="more than 67108864 bytes"):
+        ask(lambda _: httpx.Response(status, stream=parts), "material", "paper")
+    assert (parts.count, parts.is_closed) == (65, True)
+
+
+def test_an_answer_that_unpacks_to_too_much_is_left(ask: Ask) -> None:
+    """Two MB of gzip had taken 8 GB of the client."""
+    packed = gzip.compress(bytes(2**28))
+    parts = Parts(iter([packed[begin : begin + 2**16] for begin in range(0, len(packed), 2**16)]).__next__)
+    with pytest.raises(UnexpectedAnswer, match="more than 67108864 bytes"):
+        ask(lambda _: httpx.Response(200, headers={"Content-Encoding": "gzip"}, stream=parts), "material", "paper")
+    assert parts.count < 5
+
+
+@pytest.mark.parametrize("encoding", ["deflate", "gzip, gzip", "br", "zstd"])
+def test_an_answer_is_packed_as_it_was_asked_for(ask: Ask, answers: SimpleNamespace, encoding: str) -> None:
+    asked: list[httpx.Request] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        return httpx.Response(200, headers={"Content-Encoding": encoding}, stream=Parts(bytes))
+
+    with pytest.raises(UnexpectedAnswer, match=f"content encoding '{encoding}'"):
+        ask(answer, "material", "paper")
+    assert asked[0].headers["accept-encoding"] == "gzip"
+    packed = gzip.compress(json.dumps(answers.material).encode())
+    told = httpx.Response(200, headers={"Content-Encoding": "gzip"}, stream=httpx.ByteStream(packed))
+    assert ask(lambda _: told, "material", "paper").name == "paper"
+
+
+@pytest.mark.usefixtures("quick")
+def test_an_answer_that_drips_is_a_broken_connection(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each byte came in time, so that a planner waited for good."""
+    seconds = [0.0]
+
+    def drip() -> bytes:
+        seconds[0] += 7.0
+        return b" "
+
+    clock = SimpleNamespace(monotonic=lambda: seconds[0], sleep=lambda _: None)
+    monkeypatch.setattr(stiction_client.client, "time", clock)
+    asked: list[Parts] = []
+
+    def answer(_: httpx.Request) -> httpx.Response:
+        asked.append(Parts(drip))
+        return httpx.Response(200, stream=asked[-1])
+
+    with pytest.raises(ConnectionFailed, match="was not whole in time"):
+        ask(answer, "material", "paper")
+    assert [(parts.count, parts.is_closed) for parts in asked] == [(5, True)] * 3
+
+
+@pytest.mark.parametrize("charset", ["idna", "base64", "utf-99"])
+def test_an_answers_charset_does_not_matter(ask: Ask, charset: str) -> None:
+    told = {"Content-Type": f"application/json; charset={charset}"}
+    with pytest.raises(UnexpectedAnswer, match="answered 400"):
+        ask(lambda _: httpx.Response(400, headers=told, content=b"\xff\xff"), "material", "paper")

@@ -1,7 +1,7 @@
 """What a live stream does where its connection breaks, without a network: what is answered stands beforehand."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 import msgspec
@@ -10,7 +10,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.frames import Close
 
-from stiction_client import AnswerTimedOut, ConnectionFailed, stream
+from stiction_client import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer, stream
 from stiction_client.stream import SlipStream
 
 OPENED = {"type": "opened", "session": "s"}
@@ -32,7 +32,7 @@ class Connection:
         answer = next(self._answers)
         if isinstance(answer, Exception):
             raise answer
-        return msgspec.msgpack.encode(answer)
+        return answer if isinstance(answer, bytes) else msgspec.msgpack.encode(answer)
 
 
 @pytest.fixture
@@ -110,3 +110,33 @@ def test_an_answer_that_is_late_may_be_waited_for_again(opened: Any) -> None:
     with pytest.raises(AnswerTimedOut, match="no answer within 30 s; the session goes on"):
         live.receive()
     assert (live.receive()["number"], len(made)) == (0, 1)
+
+
+OTHERS = [b"\xc1", b"text", b"\x91" * 5000, [1, 2], 5, None, {}, {"type": "state"}]
+"""Messages that are none of a service's."""
+
+
+@pytest.mark.parametrize("answer", [*OTHERS, *({"number": each} for each in ("0", 0.0, -1, 2, 10**9))])
+def test_an_answer_to_no_frame_that_waits_is_told(opened: Any, answer: Any) -> None:
+    """Its number had been believed, and the frames before it forgotten."""
+    live, _ = opened([{"number": 0}, answer, {"number": 1}])
+    send(live, 2)
+    live.receive()
+    with pytest.raises(UnexpectedAnswer, match="ws://service/v1/stream answered"):
+        live.receive()
+    assert live.receive() == {"number": 1}
+
+
+@pytest.mark.parametrize("answer", [*OTHERS, {"type": "finished"}, {"grasp_log": None}])
+def test_an_end_that_is_none_is_told(opened: Any, answer: Any) -> None:
+    live, _ = opened([answer])
+    with pytest.raises(UnexpectedAnswer):
+        live.finish()
+
+
+@pytest.mark.parametrize("answer", [*OTHERS, {"type": "opened"}, {"type": "opened", "session": 5}])
+def test_a_service_of_another_kind_is_told(monkeypatch: pytest.MonkeyPatch, answer: Any) -> None:
+    made = Connection([answer])
+    monkeypatch.setattr(stream, "connect", lambda *_, **__: nullcontext(made))
+    with pytest.raises(UnexpectedAnswer):
+        SlipStream("http://service/", np.zeros((2, 2, 3)), 1e-6)
