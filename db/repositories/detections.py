@@ -234,14 +234,17 @@ def least_frictions(session: Session, material_id: int, most: int) -> list[tuple
     """What friction is at least by the load that the contact of each of a material's newest logs bore, ``most`` of them
     at most, and the log's findings.
 
-    Withdrawn logs, and those that an older version did not look for findings in, are left out.
+    Withdrawn logs, and those that an older version did not look for findings in, are left out, but counted: after a new
+    epoch tens of thousands may be withdrawn.
     """
+    of_material = GraspLogRow.material_id == material_id
+    newest = select(GraspLogRow.id).where(of_material).order_by(*_NEWEST_FIRST).limit(most).subquery()
     query = (
         select(DetectionRow.contact_friction, DetectionRow.findings)
         .join(GraspLogRow, GraspLogRow.id == DetectionRow.grasp_log_id)
-        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
+        .join(newest, newest.c.id == GraspLogRow.id)
+        .where(GraspLogRow.withdrawn_at.is_(None))
         .order_by(*_NEWEST_FIRST)
-        .limit(most)
     )
     known = [(found, against) for found, against in session.execute(query) if found and against is not None]
     return [(float(found["low"]), tuple(each["name"] for each in against)) for found, against in known]
