@@ -136,7 +136,7 @@ async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
             return answer.status_code
     except TimeoutError as error:
         raise DeliveryFailed(f"the address took longer than {TIMEOUT:g} s") from error
-    except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may hold the address
+    except (httpx.HTTPError, httpx.InvalidURL, UnicodeError) as error:  # whose texts may hold the address
         raise DeliveryFailed(f"the address cannot be reached ({type(error).__name__})") from error
 
 

@@ -209,6 +209,15 @@ def test_what_another_process_has_sent_meanwhile_is_not_sent_again(stored: Datab
     assert [each["subject"] for each in receiver.told] == ["paper", "paper", "felt", "cork"]
 
 
+def test_a_name_that_is_none_is_told_without_it(stored: Database) -> None:
+    """It had ended the look with a traceback, every 5 s."""
+    sender = Webhook(stored, "http://xn--a/", None, lambda: True)
+    assert sender.send_new() == 0
+    found(stored, "paper")
+    with pytest.raises(DeliveryFailed, match=r"cannot be reached \(InvalidCodepoint\)"):
+        sender.send_new()
+
+
 @pytest.mark.parametrize("how", ["drips", "goes on to say"])
 def test_an_address_that_never_ends_its_answer_is_left(
     stored: Database, monkeypatch: pytest.MonkeyPatch, how: str
