@@ -17,6 +17,7 @@ WHOLE_TABLES = {
     "slipcore.contact.SCHEDULE": "says what is simulated",
     "slipcore.contact.SCENE": "says what is simulated",
     "slipcore.contact.WORLD": "says what is simulated",
+    "slipcore.contact.EDGES": "of stress at cells' centres, which no log has; docs/accuracy-contact.md has its errors",
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",

@@ -12,7 +12,7 @@ import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,7 @@ from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.accuracy import difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
+from slipcore.contact.tiers.edges import centre_field, centre_forces, shares_within_edge
 from slipcore.contact.tiers.fronts import shares_within
 from slipcore.frames import FloatArray, GraspLog
 
@@ -149,10 +150,11 @@ def stepped(problem: ContactProblem, grid: Grid, tolerance: float, loads: list[S
 # Cases with a closed form: error of one run
 
 
-def hertz(grid: Grid, tolerance: float) -> float:
+def hertz(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Pressure of a sphere."""
-    solved = _hertz(grid, tolerance)
-    return relative(solved.pressure, HERTZ.pressure(np.hypot(*grid.points())))
+    pressure = _hertz(grid, tolerance).pressure
+    found = centre_field(pressure, pressure > 0.0) if corrected else pressure
+    return relative(found, HERTZ.pressure(np.hypot(*grid.points())))
 
 
 def _hertz(grid: Grid, tolerance: float) -> NormalContact:
@@ -162,48 +164,64 @@ def _hertz(grid: Grid, tolerance: float) -> NormalContact:
     return solve_normal(operators, grid, height, force=FORCE, tolerance=tolerance)
 
 
-def contact_area(grid: Grid, tolerance: float) -> float:
+def contact_area(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Area within the front of a sphere's pressure."""
-    solved = _hertz(grid, tolerance)
-    found = shares_within(solved.pressure**2, solved.pressure > 0.0).sum() * grid.cell_area
-    return float(abs(found / (np.pi * HERTZ.contact_radius**2) - 1.0))
+    pressure = _hertz(grid, tolerance).pressure
+    touches = pressure > 0.0
+    shares = shares_within_edge(pressure, touches) if corrected else shares_within(pressure**2, touches)
+    return float(abs(shares.sum() * grid.cell_area / (np.pi * HERTZ.contact_radius**2) - 1.0))
 
 
-def cattaneo_mindlin(grid: Grid, tolerance: float) -> float:
+def stresses(results: list[StepResult], grid: Grid, *, corrected: bool) -> list[FloatArray]:
+    """Stress of each step [3, ny, nx] Pa, of the cells or, by what is known of edges, at their centres."""
+    forces = centre_forces(results) if corrected else (result.force for result in results)
+    return [force / grid.cell_area for force in forces]
+
+
+def cattaneo_mindlin(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Traction at F_T = 0.7 μF_N, ν = 0."""
-    last = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.7 * SLIDING)])[-1]
+    results = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.7 * SLIDING)])
     exact = reference.CattaneoMindlin(HERTZ, FRICTION, 0.7 * SLIDING).traction(np.hypot(*grid.points()))
-    return relative(last.force[0] / grid.cell_area, exact)
+    return relative(stresses(results, grid, corrected=corrected)[-1][0], exact)
 
 
-def reversal(grid: Grid, tolerance: float) -> float:
+def reversal(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Traction on a loop between ±0.9 μF_N, ν = 0; the largest error, of the traction at the peak."""
     forces = SLIDING * np.array([0.0, 0.5, 0.9, 0.4, 0.0, -0.5, -0.9, -0.3, 0.5, 0.9])
     r = np.hypot(*grid.points())
     exact, errors = MindlinDeresiewicz(HERTZ, FRICTION), []
     peak = np.sqrt((exact.load(FORCE, 0.9 * SLIDING).traction(r) ** 2).sum())
-    for force, result in zip(forces, stepped(sphere(0.0), grid, tolerance, [shear(f) for f in forces]), strict=True):
+    results = stepped(sphere(0.0), grid, tolerance, [shear(f) for f in forces])
+    for force, stress in zip(forces, stresses(results, grid, corrected=corrected), strict=True):
         exact = exact.load(FORCE, float(force))
-        errors.append(np.sqrt(((result.force[0] / grid.cell_area - exact.traction(r)) ** 2).sum()) / peak)
+        errors.append(np.sqrt(((stress[0] - exact.traction(r)) ** 2).sum()) / peak)
     return float(max(errors))
 
 
-def torsion(grid: Grid, tolerance: float) -> float:
+def torsion(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Traction at 0.6 of the sliding moment."""
     moment = 0.6 * sliding_moment(HERTZ, FRICTION)
-    last = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.0, moment)])[-1]
+    results = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.0, moment)])
+    stress = stresses(results, grid, corrected=corrected)[-1]
     x, y = grid.points()
     r = np.hypot(x, y)
-    around = (x * last.force[1] - y * last.force[0]) / (np.where(r > 0.0, r, 1.0) * grid.cell_area)
+    around = (x * stress[1] - y * stress[0]) / np.where(r > 0.0, r, 1.0)
     return relative(around, TorsionPartialSlip(HERTZ, FRICTION, moment).traction(r))
 
 
-CLOSED: dict[str, Errors] = {
+CORRECTED = ", corrected"
+"""Of a case in which what is known of edges is used."""
+_CASES = {
     "Hertz": hertz,
     "Hertz, contact area": contact_area,
     "Cattaneo–Mindlin": cattaneo_mindlin,
     "unloading and reversal": reversal,
     "torsion": torsion,
+}
+CLOSED: dict[str, Errors] = {
+    name + CORRECTED * corrected: partial(errors, corrected=corrected)
+    for name, errors in _CASES.items()
+    for corrected in (False, True)
 }
 
 
@@ -356,16 +374,20 @@ def order_table(found: list[SceneRun], over: str) -> str:
 
 
 def curves(points: list[Point]) -> Figure:
-    """Error against time, a panel for each case."""
-    cases = list(dict.fromkeys(point.case for point in points))
+    """Error against time, a panel for each case, in which a dashed line is the case with edges corrected."""
+    cases = list(dict.fromkeys(point.case.removesuffix(CORRECTED) for point in points))
     rows = -(-len(cases) // 3)
     figure = Figure(figsize=(13.0, 3.7 * rows), layout="constrained")
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
     for axes, case in zip(panels, cases, strict=False):
-        for tolerance in dict.fromkeys(p.tolerance for p in points if p.case == case):
-            own = [p for p in points if (p.case, p.tolerance) == (case, tolerance)]
-            axes.loglog([p.seconds for p in own], [p.error for p in own], "o-", ms=4, label=f"tolerance {tolerance:g}")
-        for point in [p for p in points if (p.case, p.tolerance) == (case, own[0].tolerance)]:
+        for color, tolerance in enumerate(dict.fromkeys(p.tolerance for p in points)):
+            for name, style in ((case, "o-"), (case + CORRECTED, "s--")):
+                own = [p for p in points if (p.case, p.tolerance) == (name, tolerance)]
+                label = f"tolerance {tolerance:g}" if name == case else None
+                axes.loglog(
+                    [p.seconds for p in own], [p.error for p in own], style, ms=4, label=label, color=f"C{color}"
+                )
+        for point in [p for p in points if (p.case, p.tolerance) == (case, min(p.tolerance for p in points))]:
             axes.annotate(str(point.cells), (point.seconds, point.error), textcoords="offset points", xytext=(4, 4))
         axes.set(title=case, xlabel="processor time, s", ylabel="error")
         axes.xaxis.set_minor_formatter(NullFormatter())  # labels of a part of a decade overlap

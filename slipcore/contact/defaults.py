@@ -269,6 +269,24 @@ class StepDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeDefaults(Options):
+    """Of stress at the centres of cells along an edge (``tiers/edges.py``); trials on 11 to 180 cells."""
+
+    depth: Annotated[float, Option(1.0, 20.0, "cells", "deeper ones are right to 0.004 cells")] = 4.0
+    """Within the edge, up to which cells are corrected."""
+    beside: Annotated[float, Option(0.0, 5.0, "cells", "those that an edge may run through")] = 1.0
+    """Beyond the edge, up to which the field goes on."""
+    window: Annotated[float, Option(2.0, 10.0, "cells", "smaller ones leave too few cells within a corner")] = 3.2
+    """Around a cell, of the parabola that tells the slope there."""
+    rounds: Annotated[int, Option(1, 20, "rounds", "slope and correction agree to 1e-3 cells")] = 3
+    apart: Annotated[float, Option(0.0, 20.0, "cells", "what an edge changes falls with its square")] = 2.0
+    """From an edge of stick, up to which what an earlier one left is taken as gone."""
+    table_reach: Annotated[float, Option(0.5, 5.0, "√cells", "the excess falls as 1/d beyond")] = 1.4
+    """Of ``tiers/edge_cells.csv``: root of the largest distance."""
+    rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeDefaults(Options):
     """How far a contact reaches, found on a coarse grid (``tiers/boundary_elements.py``)."""
 
@@ -469,6 +487,7 @@ TANGENTIAL = TangentialDefaults()
 PROJECTION = ProjectionDefaults()
 LIMIT_SURFACE = LimitSurfaceDefaults()
 STEP = StepDefaults()
+EDGES = EdgeDefaults()
 PROBE = ProbeDefaults()
 ACCURACY = AccuracyDefaults()
 CHEAP_TIERS = CheapTierDefaults()
@@ -478,6 +497,6 @@ REFERENCE = ReferenceDefaults()
 
 TABLES = (
     RAMP, SCHEDULE, SCENE, FIDELITY, LAYER, INTERIOR, INFLUENCE, NORMAL, TANGENTIAL, PROJECTION, LIMIT_SURFACE, STEP,
-    PROBE, ACCURACY, CHEAP_TIERS, EXPLAIN, WORLD, REFERENCE,
+    EDGES, PROBE, ACCURACY, CHEAP_TIERS, EXPLAIN, WORLD, REFERENCE,
 )  # fmt: skip
 """All tables of the simulator."""

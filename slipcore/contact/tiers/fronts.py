@@ -1,4 +1,8 @@
-"""Areas within fronts that run through cells: of contact and, in it, of stick."""
+"""Areas within fronts that run through cells: of contact and, in it, of stick.
+
+Cells along them are taken as they are, not as ``edges.py`` corrects them: that halves the mean error of the stick ratio
+on fine grids, but not its largest, and takes as long as the frame itself.
+"""
 
 import numpy as np
 
@@ -52,14 +56,16 @@ def _shares(field: FloatArray, inside: BoolArray, beside: BoolArray) -> FloatArr
         slopes.append(np.abs(slope) / np.maximum(has_ahead.astype(float) + has_behind, 1.0))
     steep, flat = np.maximum(*slopes), np.minimum(*slopes)
     partly = (beside | (inside & _near(~inside))) & (steep > 0.0)
-    steep, flat = steep[partly], np.maximum(flat[partly], ACCURACY.flattest * steep[partly])
     shares = inside.astype(float)
-    shares[partly] = _above_zero(field[partly], steep, flat)
+    shares[partly] = share_above_zero(field[partly], steep[partly], flat[partly])
     return shares
 
 
-def _above_zero(middle: FloatArray, steep: FloatArray, flat: FloatArray) -> FloatArray:
-    """Share of a unit square in which a linear field is above zero, by its value in the middle and its two slopes."""
+def share_above_zero(middle: FloatArray, steep: FloatArray, flat: FloatArray) -> FloatArray:
+    """Share of a unit square in which a linear field is above zero, by its value in the middle and its two slopes, of
+    which the steeper one is above zero.
+    """
+    flat = np.maximum(flat, ACCURACY.flattest * steep)
     corner = middle + 0.5 * (steep + flat)
     cut = [np.maximum(corner - drop, 0.0) ** 2 for drop in (0.0, steep, flat, steep + flat)]
     return np.asarray(np.clip((cut[0] - cut[1] - cut[2] + cut[3]) / (2.0 * steep * flat), 0.0, 1.0))

@@ -1,0 +1,230 @@
+"""Stress at the centres of cells along an edge, and areas within it, against closed forms."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipk
+
+from benchmarks.contact.edge_cells import cells_along_edge
+from slipcore.contact import reference
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
+from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
+from slipcore.contact.tiers.edges import _excess, centre_field, centre_forces, shares_within_edge
+from slipcore.frames import FloatArray
+
+Surface = Callable[[FloatArray, FloatArray], FloatArray]
+FORCE, FRICTION, RADIUS, YOUNG = 10.0, 0.4, 15e-3, 1e6
+HERTZ = reference.HertzContact(RADIUS, FORCE, reference.half_space(YOUNG, 0.0))
+WIDTHS = (2.11, 2.15, 2.24)
+"""Of grids, in contact radii: others than those that the benchmark reports."""
+
+
+def sphere(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.asarray((x**2 + y**2) / (2.0 * RADIUS))
+
+
+def pressure_on(grid: Grid, height: Surface, force: float) -> FloatArray:
+    operators = Operators((HalfSpace.from_young(YOUNG, 0.0),))
+    return solve_normal(operators, grid, height(*grid.points()), force=force, tolerance=1e-7).pressure
+
+
+def off_centre(cells: int, width: float) -> Grid:
+    """A grid of that width m that lies unevenly on the origin."""
+    pitch = width / cells
+    return Grid((cells, cells), (pitch, pitch), (0.13 * pitch, 0.29 * pitch))
+
+
+def loaded(grid: Grid, loads: list[StepLoad]) -> list[StepResult]:
+    problem = ContactProblem((HalfSpace.from_young(YOUNG, 0.0),), FRICTION, heights=(sphere,))
+    return list(QuasiStatic(problem, grid, 1e-7, 1e-9).run(loads))
+
+
+def shear(share: float, moment: float = 0.0) -> StepLoad:
+    return StepLoad(FORCE, tangential=np.array([share * FRICTION * FORCE, 0.0, moment]))
+
+
+def relative(found: FloatArray, exact: FloatArray) -> float:
+    return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+
+
+def steep(x: FloatArray, y: FloatArray) -> FloatArray:
+    """A body of the fourth power of the distance."""
+    return np.asarray((x**2 + y**2) ** 2)
+
+
+def pressure_of_steep(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Its pressure, up to a factor, on a contact of radius 1 (Johnson, §5.3)."""
+    r = x**2 + y**2
+    return np.sqrt(np.maximum(1.0 - r, 0.0)) * (1.0 + 2.0 * r)
+
+
+STEEP_FORCE = 1.6 * YOUNG * np.sqrt(np.pi) * 2.0 / (0.75 * np.sqrt(np.pi))
+"""8/5 E* κ, κ = √π Γ(3)/Γ(5/2): what presses that body to a contact of radius 1."""
+
+
+def test_the_pressure_of_a_sphere_gains_an_order() -> None:
+    errors = {
+        cells: np.mean(
+            [
+                [relative(at, exact) for at in (pressure, centre_field(pressure, pressure > 0.0))]
+                for width in WIDTHS
+                for grid in [off_centre(cells, width * HERTZ.contact_radius)]
+                for pressure in [pressure_on(grid, sphere, FORCE)]
+                for exact in [HERTZ.pressure(np.hypot(*grid.points()))]
+            ],
+            axis=0,
+        )
+        for cells in (20, 84)
+    }
+    plain, corrected = np.log(errors[20] / errors[84]) / np.log(84 / 20)
+    assert plain < 1.2
+    assert corrected > 1.6
+    assert errors[84][1] < errors[84][0] / 12.0
+
+
+@pytest.mark.parametrize(("cells", "most"), [(20, 1.6e-2), (84, 1.2e-3)])
+def test_pressure_whose_square_bends_at_the_edge_is_met_too(cells: int, most: float) -> None:
+    grid = off_centre(cells, 2.2)
+    pressure, shape = pressure_on(grid, steep, STEEP_FORCE), pressure_of_steep(*grid.points())
+    exact = shape * STEEP_FORCE / (2.0 * np.pi * 0.6)  # ∫ √(1 − r²)(1 + 2r²) r dr = 1/3 + 4/15
+    found = centre_field(pressure, pressure > 0.0)
+    assert relative(found, exact) < min(most, 0.5 * relative(pressure, exact))
+
+
+def elliptic(width: float) -> tuple[Surface, Surface, float]:
+    """Height, pressure and force of a contact of half-axes 1 and ``width``, pressure YOUNG at most (Johnson, §4.2)."""
+    modulus = 1.0 - width**2
+    first, second = ellipk(modulus), ellipe(modulus)
+    along, across = width * (first - second) / modulus, width * (second / width**2 - first) / modulus
+    return (
+        lambda x, y: np.asarray(along * x**2 + across * y**2),
+        lambda x, y: YOUNG * np.sqrt(np.maximum(1.0 - x**2 - (y / width) ** 2, 0.0)),
+        2.0 / 3.0 * np.pi * width * YOUNG,
+    )
+
+
+def test_an_elliptic_contact_and_its_area_are_met() -> None:
+    height, exact, force = elliptic(0.6)
+    grid = off_centre(60, 2.2)
+    pressure = pressure_on(grid, height, force)
+    touches = pressure > 0.0
+    right = exact(*grid.points())
+    assert relative(centre_field(pressure, touches), right) < 0.2 * relative(pressure, right)
+    area = shares_within_edge(pressure, touches).sum() * grid.cell_area
+    assert area == pytest.approx(0.6 * np.pi, rel=5e-4)
+    assert abs(touches.sum() * grid.cell_area / (0.6 * np.pi) - 1.0) > 1e-2
+
+
+@pytest.mark.parametrize("share", [0.4, 0.75, 0.95])
+def test_traction_in_partial_slip_is_met(share: float) -> None:
+    grid = off_centre(60, 2.15 * HERTZ.contact_radius)
+    results = loaded(grid, [shear(0.0), shear(share)])
+    exact = reference.CattaneoMindlin(HERTZ, FRICTION, share * FRICTION * FORCE).traction(np.hypot(*grid.points()))
+    found = list(centre_forces(results))[-1][0] / grid.cell_area
+    assert relative(found, exact) < 0.15 * relative(results[-1].force[0] / grid.cell_area, exact)
+
+
+def test_traction_in_torsion_is_met() -> None:
+    grid, moment = off_centre(60, 2.15 * HERTZ.contact_radius), 0.5 * sliding_moment(HERTZ, FRICTION)
+    results = loaded(grid, [shear(0.0), shear(0.0, moment)])
+    x, y = grid.points()
+    r = np.hypot(x, y)
+    exact = TorsionPartialSlip(HERTZ, FRICTION, moment).traction(r) / r * np.stack((-y, x))
+    found = list(centre_forces(results))[-1][:2] / grid.cell_area
+    assert relative(found, exact) < 0.2 * relative(results[-1].force[:2] / grid.cell_area, exact)
+
+
+def test_what_earlier_edges_of_stick_left_stays_until_a_later_one_passes() -> None:
+    grid = off_centre(60, 2.15 * HERTZ.contact_radius)
+    shares = (0.0, 0.6, 0.2, -0.2, -0.6, 0.1, 0.7)
+    results, exact = loaded(grid, [shear(share) for share in shares]), MindlinDeresiewicz(HERTZ, FRICTION)
+    r, alone = np.hypot(*grid.points()), []
+    for share, result, force in zip(shares, results, centre_forces(results), strict=True):
+        exact = exact.load(FORCE, share * FRICTION * FORCE)
+        right = exact.traction(r)
+        if share:
+            error = relative(force[0] / grid.cell_area, right)
+            assert error < 0.4 * relative(result.force[0] / grid.cell_area, right)
+            alone.append(relative(next(centre_forces([result]))[0] / grid.cell_area, right) / error)
+    assert max(alone) > 2.0, "steps before are needed"
+
+
+def test_traction_that_sticks_all_over_ends_as_pressure_does() -> None:
+    grid, loads = off_centre(60, 2.15 * HERTZ.contact_radius), [StepLoad(0.3 * FORCE), shear(0.24)]
+    results = loaded(grid, loads)
+    assert not results[-1].at_limit[results[-1].contact].any()
+    before = reference.HertzContact(RADIUS, 0.3 * FORCE, reference.half_space(YOUNG, 0.0))
+    r = np.hypot(*grid.points())
+    exact = 0.24 / 0.7 * FRICTION * (HERTZ.pressure(r) - before.pressure(r))
+    found = list(centre_forces(results))[-1][0] / grid.cell_area
+    assert relative(found, exact) < 0.8 * relative(results[-1].force[0] / grid.cell_area, exact)
+
+
+@pytest.mark.parametrize("cells", [5, 9, 17, 40])
+def test_fields_that_do_not_end_with_a_root_stay(cells: int) -> None:
+    grid = off_centre(cells, 2.2)
+
+    def punch(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.where(x**2 + y**2 < 0.8, 0.0, np.inf)
+
+    pressure = pressure_on(grid, punch, 1e6)
+    touches = pressure > 0.0
+    np.testing.assert_allclose(centre_field(pressure, touches), pressure, rtol=0.02)
+    assert shares_within_edge(pressure, touches).sum() == pytest.approx(touches.sum(), rel=0.02)
+
+
+def test_a_contact_cut_by_the_grid_stays_there() -> None:
+    grid = off_centre(20, 1.4 * HERTZ.contact_radius)
+    pressure = pressure_on(grid, sphere, FORCE)
+    rim = np.pad(np.zeros((18, 18), dtype=bool), 1, constant_values=True)
+    found = centre_field(pressure, pressure > 0.0)
+    np.testing.assert_allclose(found[rim], pressure[rim], rtol=0.02)
+
+
+@pytest.mark.parametrize("cells", [3, 4, 5])
+def test_few_cells_become_no_worse(cells: int) -> None:
+    grid = off_centre(cells, 2.15 * HERTZ.contact_radius)
+    pressure, exact = pressure_on(grid, sphere, FORCE), HERTZ.pressure(np.hypot(*grid.points()))
+    found = centre_field(pressure, pressure > 0.0)
+    assert np.isfinite(found).all()
+    assert relative(found, exact) <= 1.05 * relative(pressure, exact)
+
+
+def test_nothing_is_made_of_no_contact_of_lone_cells_or_of_even_ones() -> None:
+    lone = np.zeros((5, 6), dtype=bool)
+    np.testing.assert_array_equal(centre_field(lone * 1.0, lone), 0.0)
+    lone[2, 3] = lone[0, 0] = True
+    np.testing.assert_array_equal(centre_field(lone * 2.0, lone), lone * 2.0)
+    even = np.ones((8, 8), dtype=bool)
+    np.testing.assert_array_equal(centre_field(even * 2.0, even), 2.0)
+    np.testing.assert_array_equal(shares_within_edge(even * 2.0, even), even)
+
+
+def test_both_sides_of_a_ring_are_corrected() -> None:
+    def errors(cells: int) -> tuple[float, float]:
+        def on(count: int) -> FloatArray:
+            pitch = 2.6e-3 * 4 / count
+            grid = Grid((count, count), (pitch, pitch))
+            return pressure_on(grid, lambda x, y: (np.hypot(x, y) - 3e-3) ** 2 / 6e-3, 5.0)
+
+        pressure, fine = on(cells), on(5 * cells)
+        exact = centre_field(fine, fine > 0.0)[2::5, 2::5]
+        return relative(pressure, exact), relative(centre_field(pressure, pressure > 0.0), exact)
+
+    plain, corrected = errors(48)
+    assert corrected < 0.5 * plain
+
+
+def test_the_table_is_that_of_a_sphere_on_a_finer_grid() -> None:
+    seems, lies, angle = cells_along_edge(off_centre(190, 2.13 * HERTZ.contact_radius))
+    found = _excess(seems, np.cos(angle), np.sin(angle))
+    assert np.sqrt(np.mean((seems - lies) ** 2)) > 0.015
+    assert np.sqrt(np.mean((seems - lies - found) ** 2)) < 0.002
