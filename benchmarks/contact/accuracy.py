@@ -2,8 +2,8 @@
 
 Error against processor time over grids and tolerances, for each contact problem with a closed form (`closed`); of
 whole scenes over grids against a fine run, with what `simulate(scene, accuracy=...)` was asked and what it kept
-(`scenes`); and the error of load steps alone (`steps`). `--parts steps` measures only these. Writes JSON and pictures,
-prints Markdown tables.
+(`scenes`); the error of load steps alone (`steps`), and of the times at which the stick ratio changes (`times`).
+`--parts steps` measures only these. Writes JSON and pictures, prints Markdown tables.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import json
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -73,7 +73,9 @@ STEPPED = ("table1_condition1_layer", "bottle_cap_twist", "cup_filling", "liftin
 STEPS = (1, 2, 4, 8)
 FINEST_STEPS = 32
 """Load steps a frame that those of ``STEPS`` are compared with, on the same grid."""
-PARTS = ("closed", "scenes", "steps")
+LEVELS = (0.9, 0.5, 0.1)
+"""Of a scene's range of stick ratio: where times are taken at which it passes."""
+PARTS = ("closed", "scenes", "steps", "times")
 
 Errors = Callable[[Grid, float], float]
 
@@ -116,6 +118,20 @@ class SceneRun:
     displacement: float
     force: float
     seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """When the stick ratio of a scene passes ``LEVELS``, against far more load steps: ``steps`` in all, ``times`` it
+    passes one, the largest and the median error s of these, NaN if one passes more often; seconds a frame lasts.
+    """
+
+    scene: str
+    steps: int
+    times: int
+    largest: float
+    median: float
+    frame: float
 
 
 MEASURES = ("displacement", "force", "mean_stick_ratio")
@@ -289,9 +305,45 @@ def load_steps(names: list[str]) -> Iterator[SceneRun]:
         print(f"{name}: steps done", flush=True)
 
 
-def plan_of(name: str) -> Plan:
-    """That of a scene of the library, or of the one that creeps."""
-    return (CREEPING if name == CREEPING.name else Scene.from_toml(name)).plan()
+def plan_of(name: str, frames: int = 1) -> Plan:
+    """That of a scene of the library, or of the one that creeps, with ``frames`` in place of each."""
+    plan = (CREEPING if name == CREEPING.name else Scene.from_toml(name)).plan()
+    if plan.sampling is None or frames == 1:
+        return plan
+    return replace(plan, sampling=replace(plan.sampling, frame_rate=frames * plan.sampling.frame_rate))
+
+
+def passing_times(names: list[str]) -> Iterator[Passed]:
+    """Scenes on the default grid with a frame for each load step, of which there are ever more."""
+    for name in names:
+        fine = run(plan_of(name, FINEST_STEPS), Fidelity(tolerance=1e-5))
+        levels, frame = _levels(fine), float(np.diff(fine.time).min()) * FINEST_STEPS
+        exact = passes(fine, levels)
+        for count in STEPS:
+            log = run(plan_of(name, count), Fidelity())
+            found = passes(log, levels)
+            errors = np.abs(found - exact) if len(found) == len(exact) else np.array([np.nan])
+            shown = float(errors.max()), float(np.median(errors))
+            yield Passed(name, int(log.metadata["steps"]), len(found), *shown, frame)
+        print(f"{name}: times done", flush=True)
+
+
+def _levels(log: GraspLog) -> list[float]:
+    assert log.truth is not None
+    low, high = np.nanmin(log.truth.stick_ratio), np.nanmax(log.truth.stick_ratio)
+    return [float(low + share * (high - low)) for share in LEVELS]
+
+
+def passes(log: GraspLog, levels: list[float]) -> FloatArray:
+    """Times s at which a log's stick ratio passes each level, on lines between frames."""
+    assert log.truth is not None
+    touches = np.isfinite(log.truth.stick_ratio)
+    time, ratio, found = log.time[touches], log.truth.stick_ratio[touches], list[FloatArray]()
+    for level in levels:
+        above = ratio - level
+        at = np.flatnonzero((above[1:] < 0.0) != (above[:-1] < 0.0))
+        found.append(time[at] + (time[at + 1] - time[at]) * above[at] / (above[at] - above[at + 1]))
+    return np.concatenate(found)
 
 
 def scene_run(name: str, plan: Plan, fidelity: Fidelity, fine: GraspLog) -> SceneRun:
@@ -414,6 +466,17 @@ def table(points: list[Point]) -> str:
     return "\n".join(lines)
 
 
+def passing_table(found: list[Passed]) -> str:
+    """Errors of the times at which the stick ratio passes its levels, in seconds and in frames."""
+    lines = ["| scene | steps | passes | largest error, s | in frames | median, s |", "|---|---|---|---|---|---|"]
+    for e in found:
+        largest = (
+            f"{e.largest:.1e} | {e.largest / e.frame:.2f} | {e.median:.1e}" if np.isfinite(e.largest) else " |  | "
+        )
+        lines.append(f"| {e.scene} | {e.steps} | {e.times} | {largest} |")
+    return "\n".join(lines)
+
+
 def request_table(kept: list[Kept]) -> str:
     """What was asked, estimated and true."""
     lines = ["| scene | asked | estimated | true | seconds |", "|---|---|---|---|---|"]
@@ -449,9 +512,12 @@ def main() -> None:
         report(
             output / "contact_accuracy_steps.json", stepped, run_table(stepped, "steps"), order_table(stepped, "steps")
         )
+    if "times" in options.parts:
+        passed = list(passing_times(options.stepped))
+        report(output / "contact_accuracy_times.json", passed, passing_table(passed))
 
 
-def report(path: Path, entries: Sequence[Point | SceneRun | Kept], *tables: str) -> None:
+def report(path: Path, entries: Sequence[Point | SceneRun | Kept | Passed], *tables: str) -> None:
     """Write what was measured as JSON, and print its tables."""
     path.write_text(json.dumps([asdict(entry) for entry in entries], indent=1))
     print(*tables, sep="\n\n", end="\n\n")

@@ -14,6 +14,7 @@ from benchmarks.contact.accuracy import (
     SceneRun,
     hertz_grid,
     order_table,
+    passes,
     plan_of,
     run_table,
     scene_run,
@@ -74,3 +75,15 @@ def test_a_scene_is_held_against_a_finer_run_of_it() -> None:
     assert (coarse.scene, coarse.cells, coarse.substeps, coarse.steps) == (name, 12, 1, same.steps)
     assert 0.0 < coarse.mean_stick_ratio <= coarse.stick_ratio < 0.2
     assert 0.0 < coarse.displacement < coarse.force < 0.1
+
+
+def test_the_stick_ratio_passes_a_level_between_two_frames() -> None:
+    log = run(plan_of("lifting_07N", 2), Fidelity(12))
+    assert log.truth is not None
+    assert len(log.time) == 2 * len(run(plan_of("lifting_07N"), Fidelity(12)).time) - 1
+    (time,) = passes(log, [0.5])
+    before = np.searchsorted(log.time, time) - 1
+    low, high = log.truth.stick_ratio[before + 1], log.truth.stick_ratio[before]
+    assert low < 0.5 <= high
+    assert np.interp(time, log.time, log.truth.stick_ratio) == pytest.approx(0.5, abs=1e-12)
+    assert len(passes(log, [-1.0])) == 0
