@@ -183,12 +183,16 @@ class Gel:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor that logs come from; ``gel`` is None where it was not described, ``calibration`` the newest version."""
+    """A sensor that logs come from; ``gel`` is None where it was not described, ``calibration`` the newest version.
+
+    ``described_by``: id of the key that described it, None where that was an admin's or no key was asked for.
+    """
 
     id: int
     name: str
     gel: Gel | None
     calibration: int | None = None
+    described_by: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,7 +108,8 @@ class MaterialOwnerRow(Base):
 class SensorRow(Base):
     """A tactile sensor that logs come from, with the mechanics of its gel where they are known.
 
-    ``young_modulus`` Pa; ``thickness`` m down to a rigid base, NULL without one; ``marker_depth`` m.
+    ``young_modulus`` Pa; ``thickness`` m down to a rigid base, NULL without one; ``marker_depth`` m; ``described_by``
+    is NULL where that was an admin, or nobody by a key.
     """
 
     __tablename__ = "sensors"
@@ -120,6 +121,7 @@ class SensorRow(Base):
     poisson_ratio: Mapped[float | None]
     thickness: Mapped[float | None]
     marker_depth: Mapped[float | None]
+    described_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
 
 
 class SensorCalibrationRow(Base):

@@ -12,6 +12,7 @@ SEVERITIES: dict[str, Severity] = {
     "forces not checked": "note",
     "same grasp": "note",
     "another's calibration": "note",
+    "another's gel": "note",
     "slow frames": "note",
     "no displacement": "note",
     "places for displacement": "warning",

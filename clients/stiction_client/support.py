@@ -31,7 +31,19 @@ UNCHECKED = "unchecked_logs"
 """Diagnostic, a sentence: how many of a material's logs an older version stored without looking for findings."""
 OTHERS_CALIBRATIONS = "others_calibrations"
 """Diagnostic, a sentence: how many of a material's logs another key's calibration corrects than sent them."""
-NOTES = (WEAKENING, SAME_GRASPS, UNCHECKED, OTHERS_CALIBRATIONS, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
+OTHERS_GELS = "others_gels"
+"""Diagnostic, a sentence: how many of a material's logs have forces by a gel that another key described."""
+NOTES = (
+    WEAKENING,
+    SAME_GRASPS,
+    UNCHECKED,
+    OTHERS_CALIBRATIONS,
+    OTHERS_GELS,
+    SENSOR_GAIN,
+    UNKNOWN_SENSOR,
+    ELEMENT_AREAS,
+    UNNOTICED,
+)
 """Diagnostics that whoever reads an answer is to know beside it."""
 ONE_GRASP = "one grasp shows not by how much others differ, and this method does not allow for it: ask method auto"
 SUPERSEDED = "a newer version took its place: fetch the current model"

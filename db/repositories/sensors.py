@@ -69,11 +69,15 @@ def count_logs(session: Session, ids: Collection[int]) -> dict[int, int]:
     return {int(row[0]): int(row[1]) for row in session.execute(query.group_by(GraspLogRow.sensor_id))}
 
 
-def describe(session: Session, name: str, gel: Gel) -> Sensor:
-    """Store the mechanics of a sensor's gel, in place of what was stored; the sensor need not be known before."""
+def describe(session: Session, name: str, gel: Gel, by: str | None = None) -> Sensor:
+    """Store the mechanics of a sensor's gel, in place of what was stored; the sensor need not be known before.
+
+    ``by``: id of the key that says so, None for an admin's.
+    """
     row = session.get_one(SensorRow, find_or_add(session, name))
     row.young_modulus, row.poisson_ratio = gel.young_modulus, gel.poisson_ratio
     row.thickness, row.marker_depth = gel.thickness, gel.marker_depth
+    row.described_by = by
     session.flush()
     return get(session, name)
 
@@ -82,4 +86,4 @@ def _record(row: SensorRow, calibration: int | None) -> Sensor:
     if row.young_modulus is None or row.poisson_ratio is None:
         return Sensor(row.id, row.name, None, calibration)
     gel = Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0)
-    return Sensor(row.id, row.name, gel, calibration)
+    return Sensor(row.id, row.name, gel, calibration, row.described_by)

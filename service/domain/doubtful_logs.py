@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from service.domain.calibrate import CORRECTED_BY_ANOTHER
+from service.domain.reconstruct import BY_ANOTHERS_GEL
 from slipcore.checks import AGAINST_FRICTION
-from stiction_client.support import OTHERS_CALIBRATIONS, UNCHECKED
+from stiction_client.support import OTHERS_CALIBRATIONS, OTHERS_GELS, UNCHECKED
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -24,6 +25,12 @@ def with_others_calibrations(model: "FrictionModel", findings: Sequence[Collecti
     by_others = [CORRECTED_BY_ANOTHER in names for names in findings]
     told = "corrected by a sensor's calibration that another key stored"
     return _counted(model, OTHERS_CALIBRATIONS, by_others, "is", "are", told)
+
+
+def with_others_gels(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
+    """The model with a note among its diagnostics where forces of logs follow from a gel that another key described."""
+    by_others = [BY_ANOTHERS_GEL in names for names in findings]
+    return _counted(model, OTHERS_GELS, by_others, "has", "have", "forces by a sensor's gel that another key described")
 
 
 def with_unchecked(model: "FrictionModel", checked: Sequence[bool]) -> "FrictionModel":

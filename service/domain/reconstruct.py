@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 RECONSTRUCTED = "reconstructed forces"
 """The finding of a log whose forces follow from its sensor's gel."""
 
+BY_ANOTHERS_GEL = "another's gel"
+"""That of one whose sensor's gel was described by another key than sent it, which is no admin's."""
+
 CONTRADICTED = "gripper's force contradicted"
 """That of one whose gel implies another normal force than the gripper reports."""
 
@@ -61,6 +64,17 @@ def reconstruction_findings(log: "GraspLog", reconstruction: "Reconstruction | N
         evidence += f"; displacements of {count} elements at the end of the sensor's range count as not seen"
     by_gel = Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")
     return [by_gel, *contradicted(reconstruction.contradicted)]
+
+
+def described_by_another(described_by: str | None, uploaded_by: str | None) -> "list[Finding]":
+    """That the gel by which a log's forces are reconstructed was described by a key that did not send it."""
+    from slipcore import Finding
+
+    if described_by is None or described_by == uploaded_by:
+        return []
+    evidence = f"key {described_by} described the sensor's gel, by which forces are reconstructed"
+    remedy = "compare it with the sensor's own, and let an admin describe that; or send logs under a name of your own"
+    return [Finding(BY_ANOTHERS_GEL, evidence, remedy)]
 
 
 def contradicted(share: float) -> "list[Finding]":

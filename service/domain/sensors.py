@@ -29,7 +29,8 @@ def find(context: Context, name: str) -> Sensor:
 def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sensor:
     """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it.
 
-    All keys' logs of that sensor do: whoever may upload may describe it once, and only admins otherwise. Raises
+    All keys' logs of that sensor do, and say so where it was neither theirs nor an admin's (``described_by_another``):
+    whoever may upload may describe it once, and only admins otherwise. Raises
     ``InvalidValue``, ``InsufficientScope``, and ``QuotaExceeded`` for a key that has changed as much as it may.
     """
     check_name(name)
@@ -42,7 +43,7 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
             raise InsufficientScope("upload", "admin")
         quotas.check_change(session, context.settings, principal.key_id)
         record(session, principal, "sensor.described", name, asdict(gel))
-        return sensors.describe(session, name, gel)
+        return sensors.describe(session, name, gel, None if principal.is_admin else principal.key_id)
 
 
 def grasping(name: str) -> str:

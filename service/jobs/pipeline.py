@@ -28,10 +28,16 @@ from estimators.method_names import SCATTER_METHODS
 from service import formats
 from service.domain.calibrate import corrected, correction_findings
 from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_unchecked
+from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_others_gels, with_unchecked
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
-from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
+from service.domain.reconstruct import (
+    bytes_needed,
+    described_by_another,
+    needs_forces,
+    reconstruction_findings,
+    with_forces,
+)
 from service.domain.same_grasp import MOST_LOGS, find_alike, fingerprint, same_grasp, signature, with_copies
 from service.domain.sensors import grasping
 from service.domain.stored_results import (
@@ -161,8 +167,8 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         own, content = fingerprint(log), signature(log)
     with run.database.read() as session:
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
-        gel = sensors.get(session, stored.sensor).gel
-    log, reconstruction = _with_forces(run, correction.log, gel)
+        sensor = sensors.get(session, stored.sensor)
+    log, reconstruction = _with_forces(run, correction.log, sensor.gel)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(
             log, method=stored.detector, lookahead=slipcore.LOOKAHEAD, sensor_model=None, **correction.options
@@ -172,6 +178,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
         findings = [
             *correction_findings(correction, stored.uploaded_by),
+            *([] if reconstruction is None else described_by_another(sensor.described_by, stored.uploaded_by)),
             *reconstruction_findings(log, reconstruction),
             *findings,
         ]
@@ -180,7 +187,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
         detection = replace(
-            detection, calibration=correction.version, corrections=correction.changed, gel=gel, fingerprint=own
+            detection, calibration=correction.version, corrections=correction.changed, gel=sensor.gel, fingerprint=own
         )
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     _store_found(run, log_id, detection, summary, own, content if history.contact.any() else b"")
@@ -303,7 +310,7 @@ def _fit_by(
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
     findings = [part.findings for part in parts]
-    model = with_others_calibrations(with_doubts(model, findings), findings)
+    model = with_others_gels(with_others_calibrations(with_doubts(model, findings), findings), findings)
     return with_copies(with_unchecked(model, [part.is_checked for part in parts]), parts)
 
 

@@ -417,7 +417,8 @@ def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callabl
 @pytest.mark.parametrize(
     ("revision", "told"),
     [
-        ("0029", "1 logs that share frames with others would be lost"),
+        ("0030", "1 keys by which gels are described would be lost"),
+        ("0029", "1 keys by which gels are described, 1 logs that share frames with others would be lost"),
         ("0026", "1 signatures of grasps would be lost"),
         ("0025", "1 signatures of grasps, 1 fingerprints of grasps would be lost"),
         ("0022", "1 fingerprints of grasps, 1 calibrations of sensors would be lost"),
@@ -443,7 +444,7 @@ def test_what_the_way_back_would_lose_is_named_and_kept(
     with database.write() as session:
         session.execute(update(DetectionRow).values(findings=found, fingerprint="1" * 64, signature=b"f", alike=["2"]))
         session.execute(update(GraspLogRow).values(withdrawn_at=now(), withdrawn_because="wet"))
-        session.execute(update(SensorRow).values(young_modulus=1e5, poisson_ratio=0.45))
+        session.execute(update(SensorRow).values(young_modulus=1e5, poisson_ratio=0.45, described_by="0" * 12))
         materials.add_alias(session, 1, "A4")
     before = migrate.current(database)
     with pytest.raises(SchemaMismatch, match=told):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel
-from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_unchecked
+from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_others_gels, with_unchecked
 from stiction_client.support import notes
 
 MODEL = FrictionModel(
@@ -47,6 +47,12 @@ def test_logs_that_others_calibrations_correct_are_counted() -> None:
     (note,) = notes(with_others_calibrations(MODEL, [["another's calibration", "no rest"], []]).diagnostics)
     assert note.startswith("1 of 2 logs is corrected by a sensor's calibration that another key stored")
     assert with_others_calibrations(MODEL, [["no rest"], []]) is MODEL
+
+
+def test_logs_whose_forces_follow_from_anothers_gel_are_counted() -> None:
+    (note,) = notes(with_others_gels(MODEL, [["another's gel"], ["no rest"], ["another's gel"]]).diagnostics)
+    assert note == "2 of 3 logs have forces by a sensor's gel that another key described"
+    assert with_others_gels(MODEL, [["no rest"]]) is MODEL
 
 
 @pytest.mark.parametrize(

@@ -35,14 +35,18 @@ def test_a_gel_is_described_by_whoever_uploads_and_again_by_an_admin(context: Co
     stiffer = replace(GEL, young_modulus=3e5)
     with pytest.raises(InsufficientScope, match="the key has scope upload; this needs admin"):
         sensors.describe(context, "left", stiffer, KEY)
-    assert sensors.find(context, "left").gel == GEL
+    found = sensors.find(context, "left")
+    assert (found.gel, found.described_by) == (GEL, "a" * 12)
     assert sensors.describe(context, "left", stiffer, ANONYMOUS).gel == stiffer
     assert sensors.find(context, "left").gel == stiffer
+    assert sensors.describe(context, "right", GEL, replace(KEY, is_admin=True)).described_by is None
+    assert sensors.find(context, "left").described_by is None
     with database.read() as session:
         told = audit.list_all(session, Window("id"), AuditFilter())
     assert [(each.action, each.subject, each.details["young_modulus"]) for each in told] == [
         ("sensor.described", "left", 2e5),
         ("sensor.described", "left", 3e5),
+        ("sensor.described", "right", 2e5),
     ]
 
 

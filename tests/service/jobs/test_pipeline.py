@@ -16,8 +16,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.errors import ClaimLost
 from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, StoredGraspLog, StoredModel
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners, sensors
-from db.tables import DetectionRow, JobRow, SampleSummaryRow
+from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners, sensors
+from db.tables import DetectionRow, GraspLogRow, JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments, ScatterPrior
 from service.domain.collect_friction import collect
 from service.domain.look_up import FrictionQuery, look_up
@@ -844,6 +844,28 @@ def test_forces_that_a_described_sensor_lacks_are_reconstructed(shop: Shop, blin
     assert found.findings is not None
     assert found.findings[0].name == "reconstructed forces"
     assert "by the data: x 100%, y 100%, z 100%" in found.findings[0].evidence
+
+
+@pytest.mark.parametrize(
+    ("described_by", "sent_by", "is_told"),
+    [("a", "b", True), ("a", None, True), ("a", "a", False), (None, "b", False)],
+)
+def test_forces_by_a_gel_that_another_key_described_say_so(
+    shop: Shop, blind: GraspLog, described_by: str | None, sent_by: str | None, is_told: bool
+) -> None:
+    """A wrong one bends friction of all who use the name; none is told of an admin's."""
+    with shop.database.write() as session:
+        for name in "ab":
+            access_keys.add(session, name, f"robot {name}", "upload", name * 64)
+        sensors.describe(session, "s", Gel(1e6, 0.49, None, 0.0), described_by)
+    log_id, job_id = shop.ingest(encode(blind))
+    with shop.database.write() as session:
+        session.execute(update(GraspLogRow).values(uploaded_by=sent_by))
+    shop.run(job_id)
+    found = shop.log(log_id).detection
+    assert found is not None
+    told = [finding.evidence for finding in found.findings or () if finding.name == "another's gel"]
+    assert told == ["key a described the sensor's gel, by which forces are reconstructed"] * is_told
 
 
 def test_a_gripper_that_reports_its_force_is_named_beside_the_gel(shop: Shop, blind: GraspLog) -> None:
