@@ -181,6 +181,13 @@ def test_fields_that_do_not_end_with_a_root_stay(cells: int) -> None:
     assert shares_within_edge(pressure, touches).sum() == pytest.approx(touches.sum(), rel=0.02)
 
 
+def test_the_area_within_a_field_that_ends_abruptly_is_that_of_its_cells() -> None:
+    x, y = Grid.square(24, 2.4).points()
+    inside = x**2 + y**2 < 0.9
+    field = np.where(inside, 4.0 - x**2 - y**2, 0.0)
+    assert shares_within_edge(field, inside).sum() == pytest.approx(inside.sum(), rel=5e-3)
+
+
 def test_a_contact_cut_by_the_grid_stays_there() -> None:
     grid = off_centre(20, 1.4 * HERTZ.contact_radius)
     pressure = pressure_on(grid, sphere, FORCE)
