@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
+from slipcore.compilation import compiled
 from slipcore.defaults import NOISE
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three
@@ -122,18 +123,26 @@ def fit_lasting(lags: IntArray, squares: FloatArray) -> Lasting:
 
 def _terms(lags: IntArray, memory: float) -> FloatArray:
     """What white noise, correlated noise and a load that changes smoothly add at each of the lags, [k, 3]."""
-    correlated = 1.0 - (4.0 * memory**lags - memory ** (2 * lags)) / 3.0
-    return np.stack([np.ones(len(lags)), correlated, (lags / lags[-1]) ** 4], axis=1)
+    terms = np.ones((len(lags), 3))
+    terms[:, 1] -= (4.0 * memory**lags - memory ** (2 * lags)) / 3.0
+    terms[:, 2] = (lags / lags[-1]) ** 4
+    return terms
 
 
 def _noise_at(time: FloatArray, series: FloatArray, lag: int) -> float:
     """Median of what evenly chosen frames show against those ``lag`` before and after; 0 where none does."""
-    room = np.empty(series.shape[1:])
     frames = np.unique(np.linspace(lag, len(time) - lag - 1, NOISE.memory).astype(int))
     shares = (time[frames] - time[frames - lag]) / (time[frames + lag] - time[frames - lag])
-    found = [
-        noise_of_three(series[k - lag], series[k], series[k + lag], share, room)
-        for k, share in zip(frames, shares, strict=True)
-    ]
-    known = [each for each in found if not math.isnan(each)]
-    return float(np.median(known)) if known else 0.0
+    found = np.empty(len(frames))
+    _fill_noise(series, frames, lag, shares, np.empty(series.shape[1:]), found)
+    known = found[~np.isnan(found)]
+    return float(np.median(known)) if len(known) else 0.0
+
+
+@compiled
+def _fill_noise(
+    series: FloatArray, frames: IntArray, lag: int, shares: FloatArray, room: FloatArray, found: FloatArray
+) -> None:
+    """As ``noise_of_three`` of each of the frames, in ``found`` [k]."""
+    for e, k in enumerate(frames):
+        found[e] = noise_of_three(series[k - lag], series[k], series[k + lag], shares[e], room)

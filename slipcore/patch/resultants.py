@@ -82,7 +82,7 @@ def _of_frame(
     force_noise: FloatArray,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Of one frame, in the order of ``Resultants``."""
-    pressing, arm, load = felt_by(force, normal, place, patch)
+    pressing, arm, load, _ = felt_by(force, normal, place, patch)
     total = pressing.sum()
     if not total > 0.0:
         return 0.0, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
@@ -96,19 +96,19 @@ def _of_frame(
 @compiled
 def felt_by(
     force: FloatArray, normal: FloatArray, place: FloatArray, patch: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Normal forces [e] of a frame's elements, their arms [2, e] about the centre of pressure, and the load on the
-    patch: F_x, F_y and M. Arms and load are NaN where nothing presses.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Normal forces [e] of a frame's elements, their arms [2, e] about the centre of pressure, the load on the patch:
+    F_x, F_y and M, and the axes [3, 3] of x, y and the normal. Arms and load are NaN where nothing presses.
     """
-    axes = axes_of(force, normal, patch)
+    axes = _axes(_mean_normal(force, normal, patch))
     f, r = _in_axes(force, patch, axes), _in_axes(place, patch, axes)
     pressing, arm = -f[2], r[:2]
     total = pressing.sum()
     if not total > 0.0:
-        return pressing, np.full_like(arm, math.nan), np.full(3, math.nan)
+        return pressing, np.full_like(arm, math.nan), np.full(3, math.nan), axes
     for axis in range(2):
         arm[axis] -= (pressing * arm[axis]).sum() / total
-    return pressing, arm, np.array([f[0].sum(), f[1].sum(), (arm[0] * f[1] - arm[1] * f[0]).sum()])
+    return pressing, arm, np.array([f[0].sum(), f[1].sum(), (arm[0] * f[1] - arm[1] * f[0]).sum()]), axes
 
 
 @compiled
@@ -158,16 +158,11 @@ def _in_axes(field: FloatArray, patch: IntArray, axes: FloatArray) -> FloatArray
     """A field [n, m, 3] at the elements of the patch, along the rows of ``axes``: [3, k]."""
     found = np.empty((3, len(patch)))
     for e in range(len(patch)):
-        x, y, z = field[patch[e, 0], patch[e, 1]]
+        i, j = patch[e, 0], patch[e, 1]
+        x, y, z = field[i, j, 0], field[i, j, 1], field[i, j, 2]
         for axis in range(3):
             found[axis, e] = axes[axis, 0] * x + axes[axis, 1] * y + axes[axis, 2] * z
     return found
-
-
-@compiled
-def axes_of(force: FloatArray, normal: FloatArray, patch: IntArray) -> FloatArray:
-    """In a frame, of the patch's elements together: as ``_axes`` of their mean normal."""
-    return _axes(_mean_normal(force, normal, patch))
 
 
 @compiled
@@ -183,11 +178,12 @@ def _mean_normal(force: FloatArray, normal: FloatArray, patch: IntArray) -> tupl
     """Mean outward normal of a patch, weighted by what presses: single normals err by degrees, their mean less."""
     x = y = z = 0.0
     for e in range(len(patch)):
-        f, n = force[patch[e, 0], patch[e, 1]], normal[patch[e, 0], patch[e, 1]]
-        weight = -(f[0] * n[0] + f[1] * n[1] + f[2] * n[2])
+        i, j = patch[e, 0], patch[e, 1]
+        n_x, n_y, n_z = normal[i, j, 0], normal[i, j, 1], normal[i, j, 2]
+        weight = -(force[i, j, 0] * n_x + force[i, j, 1] * n_y + force[i, j, 2] * n_z)
         if weight > 0.0:
-            x += weight * n[0]
-            y += weight * n[1]
-            z += weight * n[2]
+            x += weight * n_x
+            y += weight * n_y
+            z += weight * n_z
     length = math.sqrt(x * x + y * y + z * z)
     return (x / length, y / length, z / length) if length > 0.0 else (0.0, 0.0, 1.0)

@@ -9,7 +9,7 @@ from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from slipcore.compilation import compiled
 from slipcore.defaults import DEVIATION_TO_SIGMA, NORMAL_95, PATCHES
@@ -17,7 +17,7 @@ from slipcore.frames import FloatArray
 from slipcore.noise import median
 from slipcore.noise_memory import WHITE, Lasting, fit_lasting, lags_within
 from slipcore.patch.regions import NOWHERE
-from slipcore.patch.resultants import axes_of, felt_by
+from slipcore.patch.resultants import felt_by
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 _FREE_FRAMES = PATCHES.free_frames
@@ -40,6 +40,15 @@ class PatchLoads(NamedTuple):
     loads: FloatArray
     squares: FloatArray
     axes: FloatArray
+
+
+class FreeSums(NamedTuple):
+    """What elements that bear no load changed by in frames, at lags: ``sums`` [lags, t, 3] N over the largest square of
+    them, and its ``sides`` [lags, t], 0 where there is none.
+    """
+
+    sums: FloatArray
+    sides: IntArray
 
 
 def noise_of_sums(
@@ -91,7 +100,7 @@ def _lasting_of(lags: IntArray, noise: FloatArray, spans: Spans) -> Lasting:
         return WHITE
     found = fit_lasting(lags, (square[:, known] / square[0, known]).mean(axis=1))
     values = float((np.diff(spans.bounds) * np.count_nonzero(noise[0], axis=-1))[known].sum()) / found.frames
-    wider = float(student.ppf(NormalDist().cdf(NORMAL_95), values)) / NORMAL_95
+    wider = float(stdtrit(values, NormalDist().cdf(NORMAL_95))) / NORMAL_95
     return Lasting(found.gain * wider, found.frames * wider**2)
 
 
@@ -109,8 +118,9 @@ def _without_load(
     lasts; infinite where they do not.
     """
     noise = np.zeros((len(lags), len(spans.bounds) - 1, 3))
-    for lag, each in zip(lags, noise, strict=True):
-        _fill_free(time, force, spans, loads, lag, each)
+    free = FreeSums(np.empty((len(lags), len(time), 3)), np.zeros((len(lags), len(time)), np.int64))
+    _fill_sums(time, force, spans, lags, free)
+    _fill_free(time, spans, loads, lags, free, noise)
     lasting = _lasting_of(lags, noise, spans)
     found = lasting.gain * np.stack([noise[0, :, :2].max(axis=1), noise[0, :, 2]], axis=-1)
     found[(noise == 0.0).any(axis=(0, 2))] = np.inf
@@ -121,10 +131,10 @@ def _without_load(
 def _fill_loads(force: FloatArray, normal: FloatArray, place: FloatArray, spans: Spans, found: PatchLoads) -> None:
     for e, k in enumerate(spans.frame):
         patch = elements_at(spans, e)
-        pressing, arm, load = felt_by(force[k], normal[k], place[k], patch)
+        pressing, arm, load, axes = felt_by(force[k], normal[k], place[k], patch)
         found.loads[e, :3], found.loads[e, 3] = load, pressing.sum()
         found.squares[e], found.squares[e, 2] = len(patch), (arm * arm).sum()
-        found.axes[e] = axes_of(force[k], normal[k], patch)
+        found.axes[e] = axes
 
 
 @compiled
@@ -148,61 +158,88 @@ def _fill_noise(time: FloatArray, bounds: IntArray, loads: PatchLoads, lag: int,
 
 @compiled
 def _fill_free(
-    time: FloatArray, force: FloatArray, spans: Spans, loads: PatchLoads, lag: int, noise: FloatArray
+    time: FloatArray, spans: Spans, loads: PatchLoads, lags: IntArray, free: FreeSums, noise: FloatArray
 ) -> None:
-    """Of sums over elements without load along the axes of each patch, [p, 3]; 0 where too few frames have such.
+    """Of sums over elements without load along the axes of each patch, [lags, p, 3]; 0 where too few frames have such.
 
     A sum over fewer elements than the patch has counts as if all of its noise were common to them.
     """
-    found, sums, sides = np.zeros(len(time), np.bool_), np.empty((len(time), 3)), np.zeros(len(time), np.int64)
-    for p in range(len(spans.bounds) - 1):
-        begin, end = spans.bounds[p], spans.bounds[p + 1]
-        residual, count = np.empty((3, end - begin)), 0
-        for e in range(begin, end):
-            k = spans.frame[e]
-            if not (lag <= k < len(time) - lag and math.isfinite(loads.loads[e, 0])):
-                continue
-            late = (time[k] - time[k - lag]) / (time[k + lag] - time[k - lag])
-            if not found[k]:  # the same for all patches of a frame
-                off = force[k] - (1.0 - late) * force[k - lag] - late * force[k + lag]
-                sides[k] = _sum_of_square(off, spans.labels[k - lag], spans.labels[k], spans.labels[k + lag], sums[k])
-                found[k] = True
-            side = sides[k]
-            if side == 0:
-                continue
-            alike = max(math.sqrt(loads.squares[e, 0]) / side, 1.0)
-            share = alike / (side * math.sqrt(1.0 + (1.0 - late) ** 2 + late**2))
-            for axis in range(3):
-                residual[axis, count] = share * abs((loads.axes[e, axis] * sums[k]).sum())
-            count += 1
-        if count >= _FREE_FRAMES:
-            for axis in range(3):
-                noise[p, axis] = DEVIATION_TO_SIGMA * median(residual[axis, :count])
+    residual = np.empty((3, len(spans.frame)))
+    for s in range(len(lags)):
+        lag = lags[s]
+        for p in range(len(spans.bounds) - 1):
+            count = 0
+            for e in range(spans.bounds[p], spans.bounds[p + 1]):
+                k = spans.frame[e]
+                side = free.sides[s, k]
+                if side == 0 or not math.isfinite(loads.loads[e, 0]):
+                    continue
+                late = (time[k] - time[k - lag]) / (time[k + lag] - time[k - lag])
+                alike = max(math.sqrt(loads.squares[e, 0]) / side, 1.0)
+                share = alike / (side * math.sqrt(1.0 + (1.0 - late) ** 2 + late**2))
+                for axis in range(3):
+                    residual[axis, count] = share * abs((loads.axes[e, axis] * free.sums[s, k]).sum())
+                count += 1
+            if count >= _FREE_FRAMES:
+                for axis in range(3):
+                    noise[s, p, axis] = DEVIATION_TO_SIGMA * median(residual[axis, :count])
 
 
 @compiled
-def _sum_of_square(off: FloatArray, before: IntArray, now: IntArray, after: IntArray, total: FloatArray) -> int:
-    """Side of the largest square of elements without load, and the ``total`` [3] of what these changed by, ``off``."""
-    row, column, side = _largest_square(off, before, now, after)
+def _fill_sums(time: FloatArray, force: FloatArray, spans: Spans, lags: IntArray, free: FreeSums) -> None:
+    """Of the frames of patches, each once, at all lags: the forces around it are then read from memory once."""
+    off, room = np.zeros(force.shape[1:]), np.zeros((force.shape[1] + 1, force.shape[2] + 1), np.int64)
+    seen = np.zeros(len(time), np.bool_)
+    for k in spans.frame:
+        if seen[k]:
+            continue
+        seen[k] = True
+        for s in range(len(lags)):
+            lag = lags[s]
+            if lag <= k < len(time) - lag:
+                late = (time[k] - time[k - lag]) / (time[k + lag] - time[k - lag])
+                _find_changes(force, spans.labels, k, lag, late, off)
+                free.sides[s, k] = _sum_of_square(off, room, free.sums[s, k])
+
+
+@compiled
+def _find_changes(force: FloatArray, labels: IntArray, k: int, lag: int, late: float, off: FloatArray) -> None:
+    """Fill by what forces differ from the line through those ``lag`` frames before and after, ``off`` [n, m, 3] N: of
+    elements that are of no patch in these three frames; 0 for others.
+    """
+    n, m, _ = off.shape
+    for i in range(n):
+        for j in range(m):
+            free = max(labels[k - lag, i, j], labels[k, i, j], labels[k + lag, i, j]) == NOWHERE
+            for axis in range(3):
+                line = force[k, i, j, axis] - (1.0 - late) * force[k - lag, i, j, axis]
+                off[i, j, axis] = line - late * force[k + lag, i, j, axis] if free else 0.0
+
+
+@compiled
+def _sum_of_square(off: FloatArray, room: IntArray, total: FloatArray) -> int:
+    """Side of the largest square of elements that changed, and the ``total`` [3] of what these changed by, ``off``."""
+    row, column, side = _largest_square(off, room)
     total[:] = 0.0
     for i in range(row - side + 1, row + 1):
         for j in range(column - side + 1, column + 1):
-            total += off[i, j]
+            for axis in range(3):
+                total[axis] += off[i, j, axis]
     return side
 
 
 @compiled
-def _largest_square(off: FloatArray, before: IntArray, now: IntArray, after: IntArray) -> tuple[int, int, int]:
-    """Last row and column, and side, of the largest square of elements that are of no patch in three frames, and
-    changed by ``off`` [n, m, 3]: forces that a sensor sets to 0 show nothing.
+def _largest_square(off: FloatArray, room: IntArray) -> tuple[int, int, int]:
+    """Last row and column, and side, of the largest square of elements that changed by ``off`` [n, m, 3]: forces that a
+    sensor sets to 0 show nothing. ``room``: [n + 1, m + 1], of which the first row and column are 0.
     """
-    n, m = now.shape
-    sides, row, column, side = np.zeros((n + 1, m + 1), np.int64), 0, 0, 0
-    for i in range(n):
-        for j in range(m):
-            changed = off[i, j, 0] != 0.0 or off[i, j, 1] != 0.0 or off[i, j, 2] != 0.0
-            if changed and max(before[i, j], now[i, j], after[i, j]) == NOWHERE:
-                sides[i + 1, j + 1] = 1 + min(sides[i, j], sides[i, j + 1], sides[i + 1, j])
-                if sides[i + 1, j + 1] > side:
-                    row, column, side = i, j, sides[i + 1, j + 1]
+    row = column = side = 0
+    for i in range(off.shape[0]):
+        for j in range(off.shape[1]):
+            if off[i, j, 0] != 0.0 or off[i, j, 1] != 0.0 or off[i, j, 2] != 0.0:
+                room[i + 1, j + 1] = 1 + min(room[i, j], room[i, j + 1], room[i + 1, j])
+                if room[i + 1, j + 1] > side:
+                    row, column, side = i, j, room[i + 1, j + 1]
+            else:
+                room[i + 1, j + 1] = 0
     return row, column, side

@@ -74,17 +74,29 @@ def reach_rim(pressing: FloatArray, bend: FloatArray, least: float, hollow: floa
     """Let the contact reach to where the shape bends by ``hollow``, m, from what was found.
 
     Elements pressed by ``least`` join that hang together with those found: a bonded gel is so flat at the rim that this
-    lies far under half of the depth. None do where no rim is met: around a contact of many elements on a half-space the
+    lies far under half of the depth. They do, each once, beside three that touch: those along a straight edge, more
+    than show through a single gap. None do where no rim is met: around a contact of many elements on a half-space the
     shape bends by little from one to the next.
     """
     n, m = contact.shape
-    found, grows = contact.copy(), True
-    while grows:
-        grows = False
-        for i in range(n):
-            for j in range(m):
-                if not contact[i, j] and bend[i, j] <= hollow and pressing[i, j] > least and beside(contact, i, j):
-                    contact[i, j] = grows = True
+    found, may = contact.copy(), (bend <= hollow) & (pressing > least)
+    beside, waiting = np.zeros((n, m), np.int64), np.empty((n * m, 2), np.int64)
+    count = 0
+    for i in range(n):
+        for j in range(m):
+            if contact[i, j]:
+                waiting[count, 0], waiting[count, 1] = i, j
+                count += 1
+    while count > 0:
+        count -= 1
+        row, column = waiting[count, 0], waiting[count, 1]
+        for i in range(max(row - 1, 0), min(row + 2, n)):
+            for j in range(max(column - 1, 0), min(column + 2, m)):
+                beside[i, j] += 1
+                if beside[i, j] >= 3 and may[i, j] and not contact[i, j]:
+                    contact[i, j] = True
+                    waiting[count, 0], waiting[count, 1] = i, j
+                    count += 1
     if not is_rimmed(contact, found, bend, hollow):
         contact[:] = found
 
@@ -105,12 +117,6 @@ def is_rimmed(contact: BoolArray, found: BoolArray, bend: FloatArray, hollow: fl
                 outline += 1
                 rim += bend[i, j] > hollow
     return 2 * rim >= outline > 0
-
-
-@compiled
-def beside(contact: BoolArray, i: int, j: int) -> bool:
-    """Whether three of the eight neighbours touch: those along a straight edge, more than show through a single gap."""
-    return neighbours(contact, i, j) >= 3
 
 
 @compiled

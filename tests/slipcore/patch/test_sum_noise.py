@@ -6,7 +6,7 @@ import pytest
 from benchmarks.detector.bounds import common_lasting, lasting
 from slipcore.frames import FloatArray
 from slipcore.noise_memory import WHITE, Lasting
-from slipcore.patch.sum_noise import SumNoise, _largest_square, _sum_of_square, noise_of_sums
+from slipcore.patch.sum_noise import SumNoise, _find_changes, _largest_square, _sum_of_square, noise_of_sums
 from tests.slipcore.patch.spans import one_patch
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -96,22 +96,34 @@ def test_elements_without_load_show_all_noise_that_lasts() -> None:
     assert np.quantile(noises, 0.1) > 0.6 * share
 
 
-def test_the_largest_square_is_of_elements_that_are_free_and_change() -> None:
-    labels, off = np.full((6, 7), -1), np.ones((6, 7, 3))
-    assert _largest_square(off, labels, labels, labels) == (5, 5, 6)
-    touched, still = labels.copy(), off.copy()
-    touched[2, 3], still[5, 3] = 0, 0.0
-    for before, now, after in ((touched, labels, labels), (labels, touched, labels), (labels, labels, touched)):
-        assert _largest_square(off, before, now, after)[2] == 3
-    assert _largest_square(still, labels, labels, labels)[2] == 5
-    assert _largest_square(0.0 * off, labels, labels, labels)[2] == 0
+def test_changes_are_those_of_elements_that_are_free_in_three_frames() -> None:
+    random = np.random.default_rng(1)
+    force, labels = random.standard_normal((9, 4, 5, 3)), np.full((9, 4, 5), -1)
+    labels[1, 0, 0] = labels[4, 1, 1] = labels[7, 2, 2] = labels[5, 3, 3] = 0
+    off = np.ones((4, 5, 3))
+    _find_changes(force, labels, 4, 3, 0.25, off)
+    expected = force[4] - 0.75 * force[1] - 0.25 * force[7]
+    for place in ((0, 0), (1, 1), (2, 2)):
+        expected[place] = 0.0
+    np.testing.assert_allclose(off, expected, rtol=1e-12)
+
+
+def test_the_largest_square_is_of_elements_that_change() -> None:
+    off, room = np.ones((6, 7, 3)), np.zeros((7, 8), np.int64)
+    assert _largest_square(off, room) == (5, 5, 6)
+    middle, edge = off.copy(), off.copy()
+    middle[2, 3] = edge[5, 3] = 0.0
+    assert _largest_square(middle, room)[2] == 3  # in a room that has been used
+    assert _largest_square(edge, room)[2] == 5
+    assert _largest_square(0.0 * off, room)[2] == 0
+    assert _largest_square(off * [0.0, 0.0, 1.0], room)[2] == 6
 
 
 def test_a_sum_is_over_the_largest_square_alone() -> None:
-    labels, total = np.full((4, 6), -1), np.ones(3)
-    labels[:, 3] = 0
+    room, total = np.zeros((5, 7), np.int64), np.ones(3)
     off = np.arange(1.0, 73.0).reshape(4, 6, 3)
-    assert _sum_of_square(off, labels, labels, labels, total) == 3
+    off[:, 3] = 0.0
+    assert _sum_of_square(off, room, total) == 3
     np.testing.assert_allclose(total, off[:3, :3].sum(axis=(0, 1)))
-    assert _sum_of_square(0.0 * off, labels, labels, labels, total) == 0
+    assert _sum_of_square(0.0 * off, room, total) == 0
     np.testing.assert_array_equal(total, 0.0)

@@ -131,6 +131,23 @@ def test_a_contact_does_not_leak_through_a_single_gap_of_its_rim() -> None:
     np.testing.assert_array_equal(contact, wanted)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_way_to_the_rim_does_not_matter(seed: int) -> None:
+    """Passes over the lattice until nothing joins come to the same, up and down and around whatever is hollow."""
+    random = np.random.default_rng(seed)
+    pressing, bend, contact = random.random((17, 12)), 0.52 * random.random((17, 12)), np.zeros((17, 12), bool)
+    bend[[0, -1]] = bend[:, [0, -1]] = 1.0  # a rim all around
+    contact[7:10, 5:8] = True
+    wanted, before = contact.copy(), None
+    while before is None or (wanted != before).any():
+        before = wanted.copy()
+        around = ndimage.convolve(before.astype(int), np.ones((3, 3), int), mode="constant")
+        wanted |= (around >= 3) & (bend <= 0.5) & (pressing > 0.05)
+    reach_rim(pressing, bend, 0.05, 0.5, contact)
+    np.testing.assert_array_equal(contact, wanted)
+    assert contact.sum() > 50
+
+
 def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
     impulse = np.zeros((9, 9))
     impulse[4, 4] = 1.0
