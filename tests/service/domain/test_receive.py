@@ -9,7 +9,7 @@ from backports import zstd
 
 from db.blobs import BlobStore, Spool
 from service.domain import receive
-from service.domain.errors import InvalidValue, TooLarge, UnsupportedFormat
+from service.domain.errors import InvalidValue, TooLarge, UnsupportedFormat, UploadInterrupted
 
 PACKERS: dict[str, Callable[[bytes], bytes]] = {"gzip": gzip.compress, "zstd": zstd.compress}
 
@@ -128,3 +128,47 @@ def test_who_goes_just_as_the_answer_is_there_disturbs_nobody() -> None:
 
     asyncio.run(ask())
     assert told == []
+
+
+def test_a_body_may_have_as_many_bytes_as_it_may_have() -> None:
+    receive.check_size(100, 100)
+    with pytest.raises(TooLarge, match="body is 101 bytes or more; allowed: at most 100 bytes"):
+        receive.check_size(101, 100)
+
+
+@pytest.mark.parametrize(("packed", "unpacked"), [(2**20, 100 * 2**20), (1, 2**24)])
+def test_a_body_may_unpack_to_so_many_times_its_bytes(packed: int, unpacked: int) -> None:
+    receive.check_expansion(packed, unpacked, 100)
+    told = f"body is {packed} bytes that unpack to {unpacked + 1} or more; allowed: at most 100 times as many"
+    with pytest.raises(TooLarge, match=told):
+        receive.check_expansion(packed, unpacked + 1, 100)
+
+
+def test_a_body_is_written_in_its_order_a_chunk_at_a_time(spools: BlobStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(receive, "CHUNK_BYTES", 4)
+    monkeypatch.setattr(receive, "LEAST_CHUNK_BYTES", 1)
+    written: list[bytes] = []
+
+    async def in_thread(write: Callable[[bytes], object], content: bytearray) -> None:
+        written.append(bytes(content))
+        write(content)
+
+    async def chunks(*parts: bytes) -> AsyncIterator[bytes]:
+        for part in parts:
+            yield part
+            if part == b"gone":
+                raise ConnectionError
+
+    async def take(limit: int, *parts: bytes) -> bytes:
+        with spools.spool() as spool:
+            await receive.Bodies().receive(spool, chunks(*parts), limit, in_thread)
+            spool.flush()
+            return spool.path.read_bytes()
+
+    assert asyncio.run(take(10, b"ab", b"c", b"defgh", b"ij")) == b"abcdefghij"
+    assert written == [b"abcdefgh", b"ij"]
+    with pytest.raises(TooLarge, match="body is 10 bytes or more; allowed: at most 9 bytes"):
+        asyncio.run(take(9, b"ab", b"c", b"defgh", b"ij"))
+    with pytest.raises(UploadInterrupted, match=r"^the connection ended after 6 bytes$"):
+        asyncio.run(take(10, b"ab", b"gone"))
+    assert asyncio.run(take(0)) == b""

@@ -221,3 +221,34 @@ def test_the_sensor_alone_may_be_at_rest_if_it_is_of_the_same_lattice() -> None:
     assert log.metadata["rest"] == "rest.npz"
     with pytest.raises(InvalidInput, match=r"rest is a file of \(3, 3\) elements; allowed: \(2, 3\), as the log"):
         assemble(Fields({"time": np.arange(4.0), "displacement": MOVED[:, :2]}), given)
+
+
+def test_maps_of_height_are_divided_into_elements_whatever_their_sides() -> None:
+    """Of 6 × 4 pixels of 1 mm, of which those of the last element rise by 10 µm from frame to frame."""
+    height = np.zeros((FRAMES, 6, 4))
+    height[:, 4:, 2:] = 1e-5 * np.arange(FRAMES)[:, None, None]
+    log = made({"height": "height", "pixel": 1e-3, "grid": [3, 2]}, displacement=None, position=None, height=height)
+    assert (log.grid, log.element_area) == ((3, 2), pytest.approx(4e-6))
+    np.testing.assert_allclose(log.displacement[:, 2, 1, 2], 1e-5 * np.arange(FRAMES), rtol=1e-9)
+    assert not log.displacement[:, :2].any()
+    assert not log.displacement[..., :2].any()
+    assert log.metadata["rest"] == "frame 0"
+    for grid, told in (([7, 2], r"grid is \[7, 2\]; allowed: at most \[6, 4\]"), ([6, 5], r"grid is \[6, 5\]")):
+        with pytest.raises(InvalidInput, match=told):
+            made({"height": "height", "pixel": 1e-3, "grid": grid}, displacement=None, position=None, height=height)
+    assert made(
+        {"height": "height", "pixel": 1e-3, "grid": [6, 4]}, displacement=None, position=None, height=height
+    ).grid == (6, 4)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "told"),
+    [
+        ({"grid": [3, 2]}, "height is without pixel; allowed: pixel in the mapping, in m"),
+        ({"grid": [3, 2], "pixel": 1e-3, "pitch": 1e-3}, "height is with a pitch; allowed: pixel in the mapping"),
+        ({"pixel": 1e-3}, "grid is not there; allowed: the number of elements into which height is divided"),
+    ],
+)
+def test_a_map_of_height_needs_the_size_of_its_pixels_and_a_grid(mapping: dict[str, Any], told: str) -> None:
+    with pytest.raises(InvalidInput, match=told):
+        made(mapping | {"height": "height"}, displacement=None, position=None, height=np.zeros((FRAMES, 6, 4)))
