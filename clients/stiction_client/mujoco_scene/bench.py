@@ -20,8 +20,8 @@ SLIP_SPEED = 0.01
 STILL_ACCELERATES = 0.01
 """Share of the pull that accelerates; a contact that only creeps does not."""
 
-RESOLUTION = 1e-3
-"""Of the load that is expected to make it slip."""
+RESOLUTION, MOST = 1e-3, 100.0
+"""Of the load that is expected to make it slip: how closely it is found, and up to where it is looked for."""
 
 SHAPES = ("PLANE", "SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
 """Of geoms that can be taken out of their scene."""
@@ -59,9 +59,9 @@ class Bench:
         """
         low, high = 0.0, expected
         while self.speed(high, angle) <= SLIP_SPEED:
-            low, high = high, 1.5 * high
-            if high > 100.0 * expected:
+            if high == MOST * expected:
                 return math.inf
+            low, high = high, min(1.5 * high, MOST * expected)
         while high - low > RESOLUTION * expected:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if self.speed(middle, angle) > SLIP_SPEED else (middle, high)
