@@ -7,6 +7,7 @@ from pydantic import ValidationError
 
 from db.errors import DatabaseError, NotFound, StorageUnavailable
 from estimators.errors import EstimatorError, TooFewSamples
+from service import cli
 from service.cli.exit_codes import (
     FAILURE,
     INPUT_REFUSED,
@@ -73,3 +74,17 @@ def test_what_is_said_of_an_error_is_its_text_and_its_notes_line_by_line() -> No
     error.add_note("in frame 3")
     error.add_note("of log.npz")
     assert message(error) == "time is -1.0; allowed: 0 or more\nin frame 3\nof log.npz"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "garbled"),
+    [
+        (["a", "é\U0001f600"], None),
+        (["a", "b\udcff", "\ud800"], "b\udcff"),
+        (["\ud800"], "\ud800"),
+        (["\ud7ff", "\ue000"], None),
+        ([], None),
+    ],
+)
+def test_the_first_argument_that_is_no_text_is_named(arguments: list[str], garbled: str | None) -> None:
+    assert cli._garbled(arguments) == garbled
