@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from stiction_client import ConnectionFailed, InvalidArgument, ProblemError, UnexpectedAnswer, calls, problems
-from stiction_client.calls import Ended, Pause, Request, advance
+from stiction_client.calls import CachedModel, Ended, Pause, Request, advance
+from stiction_client.records import Material
 
 JOB = {
     "id": "j1",
@@ -317,3 +318,18 @@ def test_a_job_that_has_ended_is_not_waited_for(status: str) -> None:
     ended = advance(call, answer({**JOB, "status": status}))
     assert isinstance(ended, Ended)
     assert ended.result.status == status
+
+
+@pytest.mark.parametrize(("stale_after", "age", "is_asked"), [(0.0, 0.0, True), (5.0, 4.9, False), (5.0, 5.0, True)])
+def test_a_model_is_asked_for_again_once_it_is_as_old_as_it_may_get(
+    monkeypatch: pytest.MonkeyPatch, stale_after: float, age: float, is_asked: bool
+) -> None:
+    model: Any = object()
+    material = Material("paper", "", "now", 3, {"ols": model}, "ols")
+    monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: 100.0 + age))
+    step = advance(calls.model("paper", "auto", {"paper": CachedModel(material, '"tag"', 100.0)}, stale_after), None)
+    if is_asked:
+        assert isinstance(step, Request)
+        assert (step.path, step.tag) == ("/v1/materials/paper", '"tag"')
+    else:
+        assert step == Ended(model)

@@ -88,6 +88,7 @@ def test_what_was_found_is_gone_on_with_where_it_would_be_the_same(given: Any, c
         ("filter", 100_001, (1, 1), True),
         ("filter", 2500, (20, 20), False),
         ("filter", 2501, (20, 20), True),
+        ("filter", 9901, (101, 1), True),
         ("strain_rate", 2500, (20, 20), False),
         ("rigid_fit", 250, (20, 20), False),
         ("rigid_fit", 251, (20, 20), True),

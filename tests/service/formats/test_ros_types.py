@@ -76,3 +76,12 @@ def test_a_message_that_does_not_fit_is_told_by_its_topic() -> None:
 
     with pytest.raises(MemoryError):
         decoded(fail, "/tactile", b"")
+
+
+def test_what_a_library_says_is_repeated_in_part() -> None:
+    def fail(_: bytes) -> object:
+        raise ValueError("x" * 200)
+
+    with pytest.raises(InvalidInput) as refusal:
+        decoded(fail, "/tactile", b"")
+    assert refusal.value.value == f"a message that does not fit its type (ValueError: {'x' * 108})"

@@ -8,8 +8,8 @@ import pytest
 from sqlalchemy import update
 
 from db.database import Database
-from db.records import Actor, Gel, NewGraspLog
-from db.repositories import audit, grasp_logs, jobs, materials, sensors
+from db.records import Actor, NewGraspLog
+from db.repositories import audit, grasp_logs, jobs, materials
 from db.tables import GraspLogRow, JobRow
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -116,18 +116,6 @@ def test_the_trail_is_listed_newest_first_and_only_what_is_asked_for(
         assert (first["actor"], first["address"], first["request_id"], first["details"]) == (
             "key:a", "10.0.0.9", "r", {"x": 1}
         )  # fmt: skip
-
-
-def test_sensors_are_listed_by_name_with_their_gels(reach: Callable[..., Any], database: Database) -> None:
-    with database.write() as session:
-        sensors.find_or_add(session, "right")
-        sensors.describe(session, "left", Gel(2e5, 0.48, None, 5e-4))
-    told = reach("open").get("/v1/sensors").json()["items"]
-    gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 5e-4}
-    assert told == [
-        {"name": "left", "gel": gel, "calibration": None},
-        {"name": "right", "gel": None, "calibration": None},
-    ]
 
 
 def test_owners_are_added_once_and_removed_without_a_word(reach: Callable[..., Any], database: Database) -> None:

@@ -560,3 +560,16 @@ def test_a_log_that_is_looked_at_again_is_corrected_as_it_was(
         detections.remove(session, log["id"])
         jobs.requeue(session, log["job"]["id"])
     assert detected() == first
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_sensors_are_listed_by_name_with_their_gels(reach: Callable[..., Any], database: Database) -> None:
+    with database.write() as session:
+        sensors.find_or_add(session, "right")
+        sensors.describe(session, "left", Gel(2e5, 0.48, None, 5e-4))
+    told = reach("open").get("/v1/sensors").json()["items"]
+    gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 5e-4}
+    assert told == [
+        {"name": "left", "gel": gel, "calibration": None},
+        {"name": "right", "gel": None, "calibration": None},
+    ]
