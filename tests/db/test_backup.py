@@ -10,12 +10,23 @@ import pytest
 from sqlalchemy import inspect, select, update
 
 from db import migrate
-from db.backup import FILE, LACKING, LEFT_OUT, backup, restore
+from db.backup import FILE, LACKING, LEFT_OUT, _copy_rows, backup, restore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUnavailable, StoreMismatch
-from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
-from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
+from db.paging import Window
+from db.records import Actor, AuditFilter, Claim, Detection, NewGraspLog, NewModel, SampleSummary
+from db.repositories import (
+    access_keys,
+    audit,
+    detections,
+    friction_models,
+    grasp_logs,
+    jobs,
+    materials,
+    runners,
+    stores,
+)
 from db.sqlite_file import SIDE_FILES
 from db.tables import Base, GraspLogRow, MaterialRow
 
@@ -376,3 +387,15 @@ def test_a_database_of_another_version_is_not_backed_up(
     with pytest.raises(SchemaMismatch, match="0001"):
         backup(empty_database, blobs, tmp_path / "copy", nothing)
     assert not (tmp_path / "copy").exists()
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_a_take_over_is_recorded_with_the_store_that_is_filled(filled: Database, other: Database) -> None:
+    migrate.upgrade(other)
+    with other.write() as session:
+        stores.set_id(session, "5" * 32)
+    _copy_rows(filled, other, nothing, Actor("command:me"))
+    with other.read() as session:
+        (entry,) = audit.list_all(session, Window("id"), AuditFilter())
+    assert (entry.actor.name, entry.action, entry.subject) == ("command:me", "store.taken_over", "5" * 32)
+    assert entry.details["rows"]["materials"] == 3
