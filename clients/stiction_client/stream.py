@@ -1,7 +1,7 @@
 """A live stream of tactile frames to the service: slip states and friction come back (extra ``stream``)."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Any, Self
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
+from stiction_client import recorded
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
@@ -125,7 +126,7 @@ class SlipStream:
         """
         answer: dict[str, Any] = self._try(lambda: self._read(timeout))
         number = answer.get("number")
-        if not isinstance(number, int) or not self._answered < number < self._number:
+        if not isinstance(number, int) or not self._answered < number < self._number or not _is_of_force(answer):
             raise self._unexpected(answer)
         self._answered = number
         while self._waiting and self._waiting[0][0] <= self._answered:
@@ -221,6 +222,17 @@ class SlipStream:
 
     def _unexpected(self, answer: Any) -> UnexpectedAnswer:
         return UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
+
+
+def _is_of_force(answer: Mapping[str, Any]) -> bool:
+    """Whether what it commands, if it does, is a force: a hand presses with it."""
+    if answer.get("command") is None:
+        return True
+    try:
+        recorded.number("normal_force", answer["command"]["normal_force"], least=0.0)
+    except (TypeError, KeyError, ValueError):
+        return False
+    return True
 
 
 def _control(settings: ControlSettings) -> dict[str, Any]:

@@ -127,6 +127,15 @@ def test_an_answer_to_no_frame_that_waits_is_told(opened: Any, answer: Any) -> N
     assert live.receive() == {"number": 1}
 
 
+@pytest.mark.parametrize("command", [{"normal_force": each} for each in (float("nan"), -1.0, "1", True)] + [{}, 5])
+def test_a_command_that_is_no_force_is_told(opened: Any, command: Any) -> None:
+    live, _ = opened([{"number": 0, "command": command}, {"number": 0, "command": {"normal_force": 2.0}}])
+    send(live, 1)
+    with pytest.raises(UnexpectedAnswer):
+        live.receive()
+    assert live.receive()["command"] == {"normal_force": 2.0}
+
+
 @pytest.mark.parametrize("answer", [*OTHERS, {"type": "finished"}, {"grasp_log": None}])
 def test_an_end_that_is_none_is_told(opened: Any, answer: Any) -> None:
     live, _ = opened([answer])
