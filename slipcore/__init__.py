@@ -16,6 +16,7 @@ from slipcore.defaults import (
     StrainRateLiteralOptions,
     StrainRateOptions,
 )
+from slipcore.detection.reconstructed_forces import for_reconstructed_forces
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
@@ -94,6 +95,7 @@ __all__ = [
     "describe_options",
     "detect_slip",
     "element_forces",
+    "for_reconstructed_forces",
     "stick_ratio",
     "warm_up",
 ]

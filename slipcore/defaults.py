@@ -154,6 +154,18 @@ class ContradictionDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ReconstructedForcesDefaults(Options):
+    """How method "filter" takes forces that follow from displacement (``detection/reconstructed_forces.py``)."""
+
+    ratio_weight: Annotated[
+        float, Option(0.0, 10.0, "-", "5 loads, 3 gels, 2 lattices, 0 to 10 µm; errors of frames are not independent")
+    ] = 0.5
+    """Weight of the log-odds from their ratio."""
+    heading_length: Annotated[float, Option(0.0, 1.0, "m", "as above: 2 to 10 µm")] = 5e-6
+    """Motion of the object within which it is known which way it moves."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class NumericsDefaults(Options):
     """What keeps the filter's numbers finite (``detection/filter``)."""
 
@@ -280,11 +292,12 @@ NOISE = NoiseDefaults()
 SMOOTHING = SmoothingDefaults()
 CONTRADICTION = ContradictionDefaults()
 NUMERICS = NumericsDefaults()
+RECONSTRUCTED_FORCES = ReconstructedForcesDefaults()
 MARKERS = MarkerDefaults()
 SATURATION = SaturationDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
-TABLES = (NOISE, SMOOTHING, CONTRADICTION, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
+TABLES = (NOISE, SMOOTHING, CONTRADICTION, RECONSTRUCTED_FORCES, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
 """What is not an option of a method."""
 
 
@@ -468,6 +481,8 @@ class FilterOptions(ContactOptions):
     """Least normal force for a ratio."""
     force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "tuning scenes")] = 10.0
     """Least normal force over its noise, for a ratio."""
+    heading_length: Annotated[float, Option(0.0, 1.0, "m", "0: not looked at; of reconstructed forces 5 µm")] = 0.0
+    """Motion of the object within which it is known which way it moves: forces against it then speak for stick."""
     loading_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.01
     """Time constant of the load's rates."""
     pressing_share: Annotated[float, Option(0.01, 10.0, "-", "Mindlin–Deresiewicz: all stick below 1")] = 1.2

@@ -21,6 +21,7 @@ WHOLE_TABLES = {
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",
+    "slipcore.RECONSTRUCTED_FORCES": "of reconstructed forces, which the page's logs do not have",
     "slipcore.CONTRADICTION": "needs logs with faulty forces; tests/slipcore/detection has them",
     "slipcore.NOISE": "compiled kernels hold it fixed",
     "slipcore.NUMERICS": "compiled kernels hold it fixed",
@@ -36,7 +37,7 @@ ENTRIES = {
     "slipcore.forces.RESPONSE": ("digits", "which offsets are evaluated once, no result"),
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
-    "filter": ("force_floor", "0 but of reconstructed forces, whose deviation it is"),
+    "filter": ("force_floor heading_length", "0 but of reconstructed forces, which the page's logs do not have"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (
         "descents free_frames free_motion least_known least_square_arm rank settled still",

@@ -22,7 +22,15 @@ from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
 from service.stream.reconstructing import Reconstructing
-from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
+from slipcore import (
+    Frame,
+    FrictionSamples,
+    GraspLog,
+    InvalidInput,
+    SlipState,
+    collect_samples,
+    for_reconstructed_forces,
+)
 from slipcore.defaults import FilterOptions
 from slipcore.frames import UNNAMED, check_displacement, check_gripper_report, check_span
 from stiction_client import container
@@ -208,7 +216,7 @@ def _detected(session: DetectorSession, frame: Frame) -> tuple[SlipState, dict[s
     """The slip state after a frame, and what is then commanded; the session is as it was where one is refused."""
     before = session.detector.state
     if session.forces is not None and isinstance(before.setup.options, FilterOptions):
-        session.detector.set_options(force_floor=session.forces.deviation)
+        session.detector.set_options(**for_reconstructed_forces(session.forces.deviation))
     state = session.detector.step(*frame)
     try:
         return state, None if session.grip is None else session.grip.step(frame, state)

@@ -11,6 +11,7 @@ from slipcore.defaults import DEFAULT_METHOD, FORCES_METHOD, MOST_LOOKAHEAD
 from slipcore.detection.contradicting_forces import agreeing
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method, findings_by
+from slipcore.detection.reconstructed_forces import for_reconstructed_forces
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.sharpening import kernels_of, smoothing_found
@@ -35,8 +36,8 @@ def detect_slip(
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
     with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Forces that are clearly late, or
     have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
-    smoothed, as far as the log's noise shows how widely, unless options give it, and takes the deviation of
-    reconstructed forces for noise that lasts. A log without displacement is left to method "forces_only" where the
+    smoothed, as far as the log's noise shows how widely, unless options give it, and takes reconstructed forces as
+    ``for_reconstructed_forces`` says. A log without displacement is left to method "forces_only" where the
     default would see nothing. ``options`` are the method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the
     sensor model knows of noise and smoothing goes before their defaults. Raises ``InvalidInput`` as ``init`` does, and
     for a log of another lattice than the sensor model's.
@@ -50,7 +51,7 @@ def detect_slip(
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
     if log.force_deviation and method == DEFAULT_METHOD:
-        options = {"force_floor": log.force_deviation, **options}
+        options = {**for_reconstructed_forces(log.force_deviation), **options}
     log, mended = agreeing(log)
     kernel_width = options.pop("kernel_width", 0.0)
     estimated = {}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.loading import low_pass
-from slipcore.detection.filter.state import FRICTION, NORMAL, PROBABILITY, RATIO, RATIO_WEIGHT, TANGENTIAL
+from slipcore.detection.filter.state import FRICTION, NORMAL, OPPOSED, PROBABILITY, RATIO, RATIO_WEIGHT, TANGENTIAL
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import Surface
 from slipcore.frames import FloatArray
@@ -74,7 +74,7 @@ def weigh_forces(
     """Learn the force ratio at which elements slip, each its own and the mean of all; fill ``told`` [2, k] by the
     log-odds of slip of each and the variance of its ratio.
 
-    ``noise`` of an element's normal force, N.
+    ``noise`` of an element's normal force, N. Of an element whose force opposes the motion the ratio is that of stick.
     """
     log_odds, variance = told
     told[:] = 0.0
@@ -94,7 +94,7 @@ def weigh_forces(
     for e in range(len(places)):
         i, j = places[e]
         if friction > 0.0 and after[NORMAL, i, j] > least:
-            ratio = after[TANGENTIAL, i, j] / after[NORMAL, i, j]
+            ratio = 0.0 if after[OPPOSED, i, j] else after[TANGENTIAL, i, j] / after[NORMAL, i, j]
             own, known = after[RATIO, i, j], after[RATIO_WEIGHT, i, j]
             gained = ratio_log_odds(ratio, variance[e], own, known, friction, memory, tuning)
             limited = min(max(gained, -tuning.ratio_limit), tuning.ratio_limit)
@@ -123,14 +123,14 @@ def learn_ratios(
 ) -> None:
     """Forget by ``memory`` and add the force ratios of what most likely slips, of given ``variance`` [k].
 
-    Only where the normal force is above ``least`` N.
+    Only where the normal force is above ``least`` N, and the object's force does not oppose its motion.
     """
     total = weight = 0.0
     for e in range(len(places)):
         i, j = places[e]
         p, normal = elements[PROBABILITY, i, j], after[NORMAL, i, j]
         own = ratio = 0.0
-        if normal > least:
+        if normal > least and not after[OPPOSED, i, j]:
             ratio = after[TANGENTIAL, i, j] / normal
             if p > tuning.ratio_slip:
                 w = p * p / (variance[e] + tuning.ratio_variance)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
+from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.hold import step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
@@ -107,6 +108,7 @@ def step_elements(
     restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning) and not held
     readiness = 0.0 if restick or math.isnan(marker_noise) else 1.0  # nor does it begin before noise is known
     follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
+    follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, after.elements)
     if held:
         keep_ratios(elements, places, after.elements, told)
     elif change.size:

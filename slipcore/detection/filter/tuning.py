@@ -62,6 +62,7 @@ class Tuning(NamedTuple):
     ratio_variance: float
     ratio_variance_of_element: float
     ratio_least_force: float
+    heading_length: float
     force_to_noise: float
     loading_smoothing: float
     pressing_share: float

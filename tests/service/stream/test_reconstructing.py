@@ -60,6 +60,7 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
     assert session.forces is not None
     assert isinstance(options := session.detector.state.setup.options, FilterOptions)
     assert options.force_floor == session.forces.deviation == session.forces.noise  # as unsure as samples' forces
+    assert options.heading_length > 0.0 == FilterOptions().heading_length
     assert [answer["force"]["wait_for"] for answer in answers[:14]] == ["noise"] * 14
     history = detect_slip(ramp)
     for k in (40, 60, 80):

@@ -14,6 +14,7 @@ from slipcore import (
     SlipHistory,
     collect_history,
     detect_slip,
+    for_reconstructed_forces,
 )
 from slipcore.defaults import LIMITS
 from slipcore.detection.detector import init, step
@@ -136,10 +137,23 @@ def test_what_reconstructed_forces_are_unsure_of_is_noise_that_lasts(scene: Scen
     known = replace(log, force=wrong, contact=log.truth.contact, metadata=told)
     found = detect_slip(known)
     as_measured = detect_slip(replace(known, metadata={}))
-    np.testing.assert_array_equal(found.slip, detect_slip(replace(known, metadata={}), force_floor=0.03).slip)
+    so_weighed = detect_slip(replace(known, metadata={}), **for_reconstructed_forces(0.03))
+    np.testing.assert_array_equal(found.slip, so_weighed.slip)
     alone = detect_slip(replace(known, force=None, metadata={}))
     assert f1_score(log, found) > f1_score(log, alone) - 0.01
     assert f1_score(log, found) > f1_score(log, as_measured) + 0.01
+
+
+def test_when_a_load_is_turned_back_reconstructed_forces_do_not_hold_slip(scene: Scene, f1_score: Score) -> None:
+    """All sticks then, at the ratios at which it slipped: they had counted as slip for some frames."""
+    log = scene("reversal", marker_noise=3e-6)
+    assert log.truth is not None
+    told = {"force": "reconstructed", "force_deviation": "0.002"}
+    known = replace(log, contact=log.truth.contact, metadata=told)
+    found = f1_score(log, detect_slip(known))
+    assert found > f1_score(log, detect_slip(known, heading_length=0.0)) + 0.01
+    assert found > f1_score(log, detect_slip(replace(known, metadata={}))) + 0.02
+    assert found > f1_score(log, detect_slip(replace(known, force=None, metadata={})))
 
 
 def test_forces_as_unsure_as_they_may_be_large_are_taken(short_ramp: GraspLog) -> None:

@@ -20,6 +20,7 @@ from slipcore.detection.filter.state import (
     COMMON,
     FRICTION,
     NORMAL,
+    OPPOSED,
     PROBABILITY,
     RATIO,
     RATIO_WEIGHT,
@@ -135,6 +136,20 @@ def test_ratios_count_above_so_many_deviations_of_a_low_passed_force() -> None:
         expected = unwrap(ratio_log_odds)(0.5, variance, 0.0, 0.0, 0.4, 1.0 / 3.0, tuning)
         assert told[0, 0] == (pytest.approx(0.8 * 0.5 * expected) if counts else 0.0)
         np.testing.assert_allclose(common[FRICTION : FRICTION + 2], [80.0 / 3.0, 200.0 / 3.0])
+
+
+def test_a_force_against_the_motion_is_no_friction_of_slip() -> None:
+    """After a load is turned back ratios are still those of slip: they speak for stick, and are not learnt."""
+    old, new, common, told = elements(), elements(NORMAL=1.0, TANGENTIAL=0.4), np.zeros(COMMON), np.zeros((2, 3))
+    old[PROBABILITY] = 0.95
+    new[OPPOSED, 0, 1] = 1.0
+    common[FRICTION : FRICTION + 2] = 40.0, 100.0
+    unwrap(weigh_forces)(old, PLACES, 1e-3, 1.0, TUNING, new, common, told)
+    along, opposed, other = told[0]
+    assert along == other > 0.0 > opposed
+    assert new[RATIO_WEIGHT, 0, 1] == 0.0 < new[RATIO_WEIGHT, 0, 0]
+    unwrap(learn_ratios)(old, PLACES, told[1], 0.1, 1.0, TUNING, new, common)
+    assert common[FRICTION] / common[FRICTION + 1] == pytest.approx(0.4)
 
 
 def test_without_a_known_friction_ratios_say_nothing() -> None:
