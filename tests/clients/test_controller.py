@@ -24,6 +24,7 @@ from stiction_client import (
 from stiction_client.controller import gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import LoadEstimate, size_of
+from stiction_client.defaults import NORMAL_DEVIATIONS
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -212,12 +213,15 @@ def test_the_lead_follows_loads_that_grow_slowly(rate: float) -> None:
     assert np.mean(leads[60:]) == pytest.approx(rate * SETTINGS.lead_time - dead, abs=0.01)
 
 
-@pytest.mark.parametrize("error", [-0.4, 0.4])
+@pytest.mark.parametrize(("error", "modes"), [(-0.4, ["hold"]), (0.4, ["hold", "alarm"])])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_wrong_model_is_discarded_and_the_object_held(seed: int, error: float, make_model: Make) -> None:
+def test_a_wrong_model_is_discarded_and_the_object_held(
+    seed: int, error: float, modes: list[str], make_model: Make
+) -> None:
+    """One of too little friction gives way to what was learnt, without an alarm."""
     state = GraspController.init(SETTINGS, model_of(make_model, 0.45 * (1.0 + error)))
     episode = run(PointContact(LIFT, seed=seed), state)
-    assert episode.modes()[:2] == ["hold", "alarm"]
+    assert episode.modes()[:2] == modes
     assert episode.modes()[-1] == "hold"
     assert episode.plant.slipped < 1e-3
     assert 1.0 < episode.normal[-1] / episode.least < 1.25
@@ -225,10 +229,35 @@ def test_a_wrong_model_is_discarded_and_the_object_held(seed: int, error: float,
 
 def test_a_wrong_model_is_discarded_by_the_stick_ratio_alone(make_model: Make) -> None:
     state = GraspController.init(SETTINGS, model_of(make_model, 0.63))
+    modes = []
+    for frame in range(1, 5):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, 2.2, 0.0, 0.05))
+        modes.append(command.mode)
+    assert modes == ["hold", "hold", "hold", "alarm"]
+
+
+def test_while_a_load_grows_the_stick_ratio_counts_beside_a_wrong_model(make_model: Make) -> None:
+    """Without any samples, and with four tenths too much friction, the object does not slip at all."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.63))
     episode = run(PointContact(LIFT, sampled_below=0.0), state)
-    assert episode.modes()[:2] == ["hold", "alarm"]
-    assert episode.plant.slipped < 1e-3
+    assert {command.reason for command in episode.commands} >= {"stick ratio, growing load", "friction model"}
+    assert episode.plant.slipped < 1e-6
     assert episode.normal[-1] > episode.least
+
+
+@pytest.mark.parametrize(("sampled", "factor"), [(None, 0.2), (0.42, 0.42 * (1.0 - NORMAL_DEVIATIONS * 0.03035))])
+def test_what_sticks_and_is_taken_for_slip_asks_for_no_more_than_samples_show(
+    sampled: float | None, factor: float, make_model: Make
+) -> None:
+    """A stick ratio of 0.2 under a tenth of the normal force shows a friction of 0.11."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    told = None if sampled is None else SlipSamples(np.full(100, sampled), np.full(100, 0.05))
+    for frame in range(1, 10):
+        load = 0.1 + 0.05 * frame
+        state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, load, 0.0, 0.2, told))
+    asked = load * state.load.growth(SETTINGS) / (factor * utilisation(SETTINGS.feel_stick_ratio))
+    assert command.reason == "stick ratio, growing load"
+    assert command.normal_force == pytest.approx(asked, rel=1e-3)
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -443,14 +472,11 @@ def test_samples_refute_a_model_as_soon_as_they_are_enough(count: int, refuted: 
     assert (state.known is None, command.mode == "alarm") == (refuted, refuted)
 
 
-@pytest.mark.parametrize("friction", [0.34, 0.56])
 @pytest.mark.parametrize(("count", "refuted"), [(1, False), (12, True)])
-def test_a_frame_is_evidence_by_the_number_of_its_elements(
-    friction: float, count: int, refuted: bool, make_model: Make
-) -> None:
-    """Three frames of one element each refute no model, whether it shows less friction or more."""
+def test_a_frame_is_evidence_by_the_number_of_its_elements(count: int, refuted: bool, make_model: Make) -> None:
+    """Three frames of one element each refute no model."""
     state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
-    seen = SlipSamples(np.full(count, friction), np.full(count, 0.05))
+    seen = SlipSamples(np.full(count, 0.34), np.full(count, 0.05))
     modes = []
     for frame in range(1, 4):
         state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
@@ -470,11 +496,47 @@ def test_elements_that_rest_do_not_refute_what_was_learnt() -> None:
         assert command.mode == "hold"
 
 
-def test_more_friction_than_promised_refutes_no_model_at_once(make_model: Make) -> None:
+def test_more_friction_than_promised_counts_once_it_is_learnt_and_raises_no_alarm(make_model: Make) -> None:
     state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
     seen = SlipSamples(np.full(12, 0.7), np.full(12, 0.05))
-    state, _ = GraspController.step(state, Observation(FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+    for frame in range(1, SETTINGS.learn_frames + 1):
+        assert state.known is not None
+        assert state.known.of_others
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+        assert command.mode == "hold"
     assert state.known is not None
+    assert not state.known.of_others
+    assert state.known.expected(2.0) == pytest.approx(0.7, rel=1e-12)
+
+
+@pytest.mark.parametrize(("load", "refuted"), [(0.3, False), (0.5, True)])
+def test_samples_that_differ_are_waited_for_while_the_load_is_far_from_what_they_bear(
+    load: float, refuted: bool, make_model: Make
+) -> None:
+    """Of 0.28 with an error of 0.012 the contact bears 0.49 N under 2 N, and 0.39 N while a third of it sticks."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    for frame in range(1, 7):
+        seen = SlipSamples(np.full(25, 0.28 + 0.04 * (-1) ** frame), np.full(25, 0.05))
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, load, 0.0, 0.5, seen))
+    assert (command.mode == "alarm") is refuted
+
+
+@pytest.mark.parametrize(
+    ("moving", "count", "refuted"), [(0.6, 20, True), (0.1, 20, False), (0.6, 6, True), (0.6, 5, False)]
+)
+def test_what_moves_and_is_more_than_the_rim_refutes_a_model_whatever_the_stick_ratio_says(
+    moving: float, count: int, refuted: bool, make_model: Make
+) -> None:
+    """A stick ratio of 0.6 under 1.4 N says that the contact bears 2.6 N, a friction of 0.52, and that the ring that
+    slips is pressed with 1.26 N; a fifth of it is 0.25 N.
+    """
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    for frame in range(1, 9):
+        seen = SlipSamples(np.full(count, 0.3), np.full(count, 0.05 if count == 20 else 0.0445), moving)
+        state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, 1.4, 0.0, 0.6, seen))
+        if command.mode == "alarm":
+            break
+    assert (command.mode == "alarm") is refuted
 
 
 @pytest.mark.parametrize("probability", [1e-6, 1e-3, 0.5])
@@ -483,14 +545,14 @@ def test_a_model_s_scatter_is_read_off_its_quantile(probability: float, make_mod
     known = KnownFriction.of_model(model_of(make_model, 0.45), settings)
     for friction, refuted in [(0.42, False), (0.3, True)]:
         learned = LearnedFriction((friction,), (100,))
-        assert known.refuted(learned, 1.0, 5.0, settings) is refuted
+        assert known.refuted(learned, LoadEstimate(1.4), 5.0, settings) is refuted
 
 
 def test_samples_of_less_friction_than_is_borne_refute_nothing(make_model: Make) -> None:
     known = KnownFriction.of_model(model_of(make_model, 0.45), SETTINGS)
     learned = LearnedFriction((0.3,), (100,))
-    assert known.refuted(learned, 1.0, 5.0, SETTINGS)
-    assert not known.refuted(learned, 0.42 * 5.0, 5.0, SETTINGS)
+    assert known.refuted(learned, LoadEstimate(1.4), 5.0, SETTINGS)
+    assert not known.refuted(learned, LoadEstimate(0.42 * 5.0), 5.0, SETTINGS)
 
 
 def test_samples_that_the_stick_ratio_contradicts_teach_nothing() -> None:
@@ -519,7 +581,7 @@ def test_the_first_touch_lasts_until_a_load_rests(make_model: Make) -> None:
     asked = np.array([command.normal_force for command in episode.commands])
     touch = int(np.argmax(asked < 2.0))
     assert 0.8 < episode.time[touch] < 1.5
-    assert (asked[:touch] == 2.0).all()
+    assert asked[:touch] == pytest.approx(2.0, rel=0.01)  # the load's growth hardly asks for more
     assert not fell_or_rose_too_fast(episode)
     assert 1.0 < episode.normal[-1] / episode.least < 1.3
     assert GraspController.init(dataclasses.replace(settings, touch_force=0.1)).normal_force == SETTINGS.least_force

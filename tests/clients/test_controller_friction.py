@@ -8,6 +8,7 @@ import pytest
 
 from stiction_client import Contact, ControlSettings, InvalidArgument
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, error_of_mean, utilisation
+from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.recognition import GripRecognition
 from stiction_client.quantile import FrictionQuantile
 from tests.service.report.test_material import MODEL
@@ -118,16 +119,16 @@ def test_no_friction_agrees_with_nothing() -> None:
     assert not LearnedFriction((0.0,) * 4, (4,) * 4, ()).agrees(4, SETTINGS)
 
 
-@pytest.mark.parametrize(("mean", "refutes"), [(0.293, True), (0.294, False)])
+@pytest.mark.parametrize(("mean", "refutes"), [(0.295, True), (0.296, False)])
 def test_samples_refute_what_lies_further_off_than_both_errors_explain(mean: float, refutes: bool) -> None:
-    """A scatter of 0.1 and an error of 0.05 · 0.5 are 0.1031 together: twice of that below 0.5 is 0.2938."""
-    assert KNOWN.refuted(learned(mean), 0.0, 2.0, SETTINGS) is refutes
+    """A scatter of 0.1 and an error of 0.0412 · 0.5 are 0.1021 together: twice of that below 0.5 is 0.2958."""
+    assert KNOWN.refuted(learned(mean, mean), LoadEstimate(), 2.0, SETTINGS) is refutes
 
 
 def test_a_load_that_is_borne_shows_as_much_friction_whatever_samples_say() -> None:
-    assert KNOWN.refuted(learned(0.1), 0.0, 2.0, SETTINGS)
-    assert not KNOWN.refuted(learned(0.1), 0.8, 2.0, SETTINGS)
-    assert not KNOWN.refuted(LearnedFriction(), 0.0, 2.0, SETTINGS)
+    assert KNOWN.refuted(learned(0.1), LoadEstimate(0.2), 2.0, SETTINGS)
+    assert not KNOWN.refuted(learned(0.1), LoadEstimate(0.8), 2.0, SETTINGS)
+    assert not KNOWN.refuted(LearnedFriction(), LoadEstimate(0.2), 2.0, SETTINGS)
 
 
 def test_samples_sharpen_a_quantile_as_bayes_has_it() -> None:

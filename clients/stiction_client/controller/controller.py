@@ -91,7 +91,8 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
     counts = samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees)
     if samples is not None and counts:
-        learned = learned.with_frame(sampled, samples.normal_force.size, agrees, state.settings)
+        taken = agrees or (_has_model(state) and _covers_ring(samples, observation, state.settings))
+        learned = learned.with_frame(sampled, samples.normal_force.size, taken, state.settings)
     if recognition is not None:
         told = sampled if agrees and counts else math.nan
         count = 0 if samples is None else samples.normal_force.size
@@ -130,8 +131,22 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
 
     What rests bears its friction just before all of a contact slips. To a model that is then wrong it is a warning.
     """
-    warns = agrees and state.known is not None and state.known.of_others
-    return warns or samples.moving >= state.settings.moving_share
+    return (agrees and _has_model(state)) or samples.moving >= state.settings.moving_share
+
+
+def _covers_ring(samples: SlipSamples, observation: Observation, settings: ControlSettings) -> bool:
+    """Whether samples bear enough of what presses the ring that slips by the stick ratio sr, (1 − sr)^(3/2) (Hertz).
+
+    Then they show friction that the stick ratio, which misses slip, may contradict; a few at the rim do not.
+    """
+    slipping = 1.0 - observation.stick_ratio
+    ring = observation.normal * slipping * math.sqrt(slipping)
+    return float(samples.normal_force.sum()) >= settings.moving_share * ring
+
+
+def _has_model(state: ControllerState) -> bool:
+    """Whether what is known is of other grasps, which samples of this one can contradict."""
+    return state.known is not None and state.known.of_others
 
 
 def _contradicts(state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float) -> bool | None:
@@ -179,7 +194,7 @@ def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> boo
     """Whether all samples together speak against what is known, or slip in some frames in a row does."""
     if state.contradictions >= state.settings.contradiction_frames:
         return True
-    return normal > 0.0 and known.refuted(state.learned, state.load.size, normal, state.settings)
+    return normal > 0.0 and known.refuted(state.learned, state.load, normal, state.settings)
 
 
 def _recognised(state: ControllerState, normal: float) -> ControllerState:
@@ -197,8 +212,11 @@ def _recognised(state: ControllerState, normal: float) -> ControllerState:
 
 def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> ControllerState:
     """With what this grasp's samples add; slip, where they had more friction than a model, disproves them."""
+    learnt = state.learned.known(state.settings)
     if not known.of_others:
-        return replace(state, known=state.learned.known(state.settings) or known)
+        return replace(state, known=learnt or known)
+    if learnt is not None and normal > 0.0 and known.surpassed(state.learned, normal, state.settings):
+        return replace(state, known=learnt, material=None, probability=0.0)
     if state.sticking.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
         return replace(state, known=replace(known, sharpened=1.0, shifted=1.0, samples=0), learned=LearnedFriction())
     return replace(state, known=known.sharpen(state.learned, normal, state.settings))
@@ -247,6 +265,9 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     if slips:
         demands.append(_Demand(observation.normal * (1.0 + settings.reflex_gain), "slip"))
     if state.known is not None:
+        if growth > 1.0 + settings.steady_share:
+            asked = state.sticking.required(state.load.size * growth, settings.feel_stick_ratio, _shown(state))
+            demands.append(_Demand(asked, "stick ratio, growing load"))
         asked = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
         return [*demands, _Demand(asked, "friction model" if growth == 1.0 else "friction model, growing load")]
     load = state.load.size * growth
@@ -266,6 +287,14 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
         why = "no stick ratio" if _blind(state) else "friction unknown"
         demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
     return demands
+
+
+def _shown(state: ControllerState) -> float:
+    """The least friction that a contact which is seen to slip may have: what samples say, or what most objects have.
+
+    What sticks, taken for slip, would ask for ever more.
+    """
+    return max(state.learned.low(state.settings), state.settings.unknown_friction)
 
 
 def _limited(state: ControllerState, force: float, elapsed: float) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from statistics import NormalDist, median
 
 from stiction_client.contacts import Contact
+from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.defaults import LEAST_CERTAIN, NORMAL_DEVIATIONS
 from stiction_client.holding import LoadedContact
@@ -65,18 +66,32 @@ class KnownFriction:
         low, mean = self._low_and_mean(force)
         return low, 2.0 * mean - low
 
-    def refuted(self, learned: "LearnedFriction", size: float, force: float, settings: ControlSettings) -> bool:
-        """Whether the latest samples together speak for other friction under ``force`` N than both errors explain.
+    def refuted(self, learned: "LearnedFriction", load: LoadEstimate, force: float, settings: ControlSettings) -> bool:
+        """Whether the latest samples together speak for less friction under ``force`` N than both errors explain.
 
-        A contact that bears a load of ``size`` N has at least that friction, whatever samples say; more friction than
-        promised is no danger, and waits for ``contradiction_frames``.
+        They have to agree, unless by what they say less its error the ``load`` to come would leave less sticking than
+        ``learn_stick_ratio``: until then more of them can be waited for. A contact that bears a load has at least that
+        friction, whatever samples say.
         """
         if not learned.values:
             return False
+        borne = utilisation(settings.learn_stick_ratio) * learned.low(settings) * force
+        if load.lead(settings) <= borne and not learned.agrees(settings.contradiction_frames, settings):
+            return False
+        mean, error = self._mean_and_error(learned, force, settings)
+        return mean - max(learned.mean, load.size / force) > settings.contradiction_deviations * error
+
+    def surpassed(self, learned: "LearnedFriction", force: float, settings: ControlSettings) -> bool:
+        """Whether the latest samples together speak for more friction under ``force`` N than both errors explain."""
+        mean, error = self._mean_and_error(learned, force, settings)
+        return learned.mean - mean > settings.contradiction_deviations * error
+
+    def _mean_and_error(
+        self, learned: "LearnedFriction", force: float, settings: ControlSettings
+    ) -> tuple[float, float]:
+        """The mean under ``force`` N, and one standard deviation of what the samples' mean may differ by from it."""
         low, mean = self._low_and_mean(force)
-        error = math.hypot((mean - low) / self.deviations, learned.error(settings) * mean)
-        away = learned.mean - mean if len(learned.values) >= settings.contradiction_frames else 0.0
-        return max(away, mean - max(learned.mean, size / force)) > settings.contradiction_deviations * error
+        return mean, math.hypot((mean - low) / self.deviations, learned.error(settings) * mean)
 
     def sharpen(self, learned: "LearnedFriction", force: float, settings: ControlSettings) -> "KnownFriction":
         """The same with what the samples of this grasp say under ``force`` N, once ``contradiction_frames`` agree.
@@ -140,6 +155,10 @@ class LearnedFriction:
         """Of the mean, relative: one standard deviation, of which the bias common to all samples is a part."""
         return error_of_mean(sum(self.counts), settings)
 
+    def low(self, settings: ControlSettings) -> float:
+        """The mean less what it may err by; 0 without samples."""
+        return self.mean * (1.0 - NORMAL_DEVIATIONS * self.error(settings)) if self.values else 0.0
+
     def lowest(self, settings: ControlSettings) -> float:
         """The least friction to expect while the force is being lowered; NaN while there are few samples.
 
@@ -164,7 +183,7 @@ class LearnedFriction:
         """A model of it, once ``learn_frames`` agree to within ``learn_spread``."""
         if not self.agrees(settings.learn_frames, settings):
             return None
-        low = self.mean * (1.0 - NORMAL_DEVIATIONS * self.error(settings))
+        low = self.low(settings)
         return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None
 
 

@@ -34,11 +34,15 @@ class StickRatioEstimate:
         slipping = self.slipping + 1 if ratio <= settings.reflex_stick_ratio else 0
         return StickRatioEstimate(observation.time, ratio, friction, slipping)
 
-    def required(self, load: float, stick_ratio: float) -> float:
-        """Normal force, N, under which ``load`` N leaves so much sticking; 0 while no friction was felt."""
+    def required(self, load: float, stick_ratio: float, least: float = 0.0) -> float:
+        """Normal force, N, under which ``load`` N leaves so much sticking; 0 while no friction was felt.
+
+        ``least``: friction that the contact is known to have, whatever was felt.
+        """
         if math.isnan(self.friction) or load == 0.0:
             return 0.0
-        return load / (self.friction * utilisation(stick_ratio)) if self.friction > 0.0 else math.inf
+        friction = max(self.friction, least)
+        return load / (friction * utilisation(stick_ratio)) if friction > 0.0 else math.inf
 
     def slips(self, settings: ControlSettings) -> bool:
         """Whether next to nothing sticks, and not by an error of one frame."""
