@@ -55,6 +55,8 @@ class SteadyClock:
         with self._database.write(durable=False) as session:
             seen = stores.seen_clock(session, lock=True) or SeenClock(look.at, 0.0)
             last = self._last if self._last and self._last.at == seen.at else None  # else others looked meanwhile
+            if last is not None and look.moment - last.moment > STEADY.total_seconds():
+                last = None  # asleep, when one clock of the machine set both
             jump = _jump(seen, last, look)
             if jump is not None:
                 logger.warning("the clock has jumped by %s: nothing is deleted by its age for %s", jump, STEADY)

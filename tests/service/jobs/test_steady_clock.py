@@ -115,6 +115,18 @@ def test_a_machine_that_sleeps_at_night_believes_its_clock(store: Database, cloc
     assert clock.is_believed()
 
 
+@pytest.mark.parametrize("by", [timedelta(days=3), timedelta(days=3650)])
+def test_a_clock_that_went_on_for_days_asleep_is_watched_anew(store: Database, clocks: Clocks, by: timedelta) -> None:
+    """Both are set by the machine's own clock as it wakes: where that was wrong, uploads of ten years were deleted."""
+    clock = believed(SteadyClock(store), clocks)
+    log_id = log_of(store, clocks)
+    clocks.go(by, asleep=by)
+    assert not clock.is_believed()
+    assert since(store, log_id) == clocks.wall
+    clocks.go(STEADY)
+    assert clock.is_believed()
+
+
 def test_without_a_clock_that_goes_on_asleep_a_night_is_a_jump(
     store: Database, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,8 +308,9 @@ def test_a_clock_that_jumps_by_little_every_week_lets_files_grow_old(store: Data
     clock = believed(SteadyClock(store), clocks)
     log, at = log_of(store, clocks), clocks.wall
     for _ in range(10):
-        clocks.go(timedelta(days=7))
-        clock.is_believed()
+        for _ in range(7):
+            clocks.go(timedelta(days=1))
+            clock.is_believed()
         look(clock, clocks, timedelta(minutes=2))
     assert abs(since(store, log) - at - 10 * timedelta(minutes=2)) < timedelta(seconds=1)
 
