@@ -66,14 +66,19 @@ def reconstruction_findings(log: "GraspLog", reconstruction: "Reconstruction | N
     return [by_gel, *contradicted(reconstruction.contradicted)]
 
 
+def is_anothers(described_by: str | None, uploaded_by: str | None) -> bool:
+    """Whether a log's gel was described by a key that is no admin's and did not send it."""
+    return described_by is not None and described_by != uploaded_by
+
+
 def described_by_another(described_by: str | None, uploaded_by: str | None) -> "list[Finding]":
     """That the gel by which a log's forces are reconstructed was described by a key that did not send it."""
     from slipcore import Finding
 
-    if described_by is None or described_by == uploaded_by:
+    if not is_anothers(described_by, uploaded_by):
         return []
     evidence = f"key {described_by} described the sensor's gel, by which forces are reconstructed"
-    remedy = "compare it with the sensor's own, and let an admin describe that; or send logs under a name of your own"
+    remedy = "compare it with the sensor's own, let an admin describe that, and send again; or use a name of your own"
     return [Finding(BY_ANOTHERS_GEL, evidence, remedy)]
 
 

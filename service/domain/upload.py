@@ -31,7 +31,7 @@ from service.domain.ownership import check_may_add, check_may_change
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unless_gone, unpack
-from service.domain.reconstruct import RECONSTRUCTED
+from service.domain.reconstruct import BY_ANOTHERS_GEL, RECONSTRUCTED, is_anothers
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings
 from service.settings import Settings
@@ -263,16 +263,19 @@ def _can_go_on(session: Session, log: StoredGraspLog) -> bool:
 def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, was done by a
     version that did not look for all, or the log's forces follow from its sensor's gel, or would have, and that is
-    described otherwise than when they were looked for.
+    described otherwise, or by whom else, than when they were looked for.
     """
     job, found = log.job, log.detection
     if job.status in {"failed", "cancelled"}:
         return True
     if found is not None and _is_unchecked(session, log.id, found):
         return job.finished_at is not None
-    findings = () if found is None else found.findings or ()
-    by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
-    return by_gel and job.finished_at is not None and _gel(session, log) != (None if found is None else found.gel)
+    names = {finding.name for finding in (() if found is None else found.findings or ())}
+    sensor, gel = stored_sensors.get(session, log.sensor), None if found is None else found.gel
+    is_by_another = RECONSTRUCTED in names and is_anothers(sensor.described_by, log.uploaded_by)
+    is_otherwise = sensor.gel != gel or is_by_another != (BY_ANOTHERS_GEL in names)
+    by_gel = job.status == "refused" or RECONSTRUCTED in names
+    return by_gel and job.finished_at is not None and is_otherwise
 
 
 def _is_calibrated_anew(session: Session, log: StoredGraspLog, material_id: int | None, principal: Principal) -> bool:

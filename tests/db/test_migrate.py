@@ -16,10 +16,12 @@ from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.paging import Window
 from db.records import (
+    Actor,
     CalibrationPress,
     Claim,
     Detection,
     Finding,
+    Gel,
     NewCalibration,
     NewGraspLog,
     NewModel,
@@ -39,6 +41,7 @@ from db.repositories import (
     jobs,
     materials,
     runners,
+    sensors,
     stores,
 )
 from db.tables import Base, DetectionRow, GraspLogRow, MaterialOwnerRow, SensorRow, now
@@ -392,6 +395,25 @@ def test_a_table_that_someone_changed_is_named(database: Database) -> None:
 
 
 @ONLY_SQLITE
+def test_who_described_a_sensor_before_that_was_noted_is_known_by_the_audit_trail(database: Database) -> None:
+    """Else logs of the very sensors whose gels somebody had described wrongly said nothing of it."""
+    gel = Gel(2e5, 0.48, None, 0.0)
+    with database.write() as session:
+        for name, scope in (("robot", "upload"), ("chief", "admin")):
+            access_keys.add(session, name * 2, name, scope, 64 * name[0])
+        for name, actors in {"left": ("chief", "robot"), "right": ("robot", "chief"), "thumb": (), "other": ()}.items():
+            sensors.describe(session, name, gel)
+            for actor in actors:
+                audit.add(session, Actor(f"key:{actor * 2}", None, None), "sensor.described", name, {})
+        audit.add(session, Actor("anybody", None, None), "sensor.described", "other", {})
+        sensors.find_or_add(session, "bare")
+    migrate.downgrade(database, "0030")
+    migrate.upgrade(database)
+    with database.read() as session:
+        found = {each.name: each.described_by for each in sensors.list_all(session)}
+    assert found == {"left": "robotrobot", "right": None, "thumb": None, "other": None, "bare": None}
+
+
 def test_a_migration_that_breaks_references_is_named(database: Database) -> None:
     row = "'1', 'fit', 'queued', '{}', 99, 'ols', 0, 0, '2026-01-01'"
     columns = "id, kind, status, seconds, material_id, method, seed, deaths, created_at"

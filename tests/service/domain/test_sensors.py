@@ -50,6 +50,21 @@ def test_a_gel_is_described_by_whoever_uploads_and_again_by_an_admin(context: Co
     ]
 
 
+def test_an_admin_who_says_the_same_vouches_for_a_description(context: Context, database: Database) -> None:
+    """Logs told for good whose gel it is, also where it is right, and that an admin was to describe it."""
+    sensors.describe(context, "left", GEL, KEY)
+    for _ in range(2):
+        assert sensors.describe(context, "left", GEL, ANONYMOUS) == sensors.find(context, "left")
+        assert sensors.find(context, "left").described_by is None
+    assert sensors.describe(context, "left", GEL, KEY).described_by is None
+    with database.read() as session:
+        told = audit.list_all(session, Window("id"), AuditFilter())
+    assert [(each.actor.name, each.action) for each in told] == [
+        ("key:aaaaaaaaaaaa", "sensor.described"),
+        ("anybody", "sensor.described"),
+    ]
+
+
 def test_a_key_describes_as_many_sensors_a_day_as_it_may(context: Context) -> None:
     for name in ("left", "right"):
         sensors.describe(context, name, GEL, KEY)

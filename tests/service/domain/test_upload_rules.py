@@ -20,15 +20,21 @@ SESSION: Any = None
 
 @pytest.fixture(autouse=True)
 def gel(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sensor's gel as it is described now; of each log it is known whether its grasp was looked for."""
-    monkeypatch.setattr(stored_sensors, "get", lambda *_: SimpleNamespace(gel=GEL, calibration=None))
+    """The sensors' gel as it is described now, the left one's by an admin; of each log it is known whether its grasp
+    was looked for.
+    """
+
+    def get(_: Any, name: str) -> Any:
+        return SimpleNamespace(gel=GEL, calibration=None, described_by=None if name == "left" else "a")
+
+    monkeypatch.setattr(stored_sensors, "get", get)
     monkeypatch.setattr(detections, "has_signature", lambda _, log_id: log_id != "unsigned")
 
 
 def log(status: str = "done", found: Any = "nothing against it", log_id: str = "7f", ended: bool = True) -> Any:
     detection = SimpleNamespace(findings=(), gel=GEL) if found == "nothing against it" else found
     job = SimpleNamespace(status=status, finished_at="then" if ended else None)
-    return SimpleNamespace(id=log_id, job=job, detection=detection, sensor="left")
+    return SimpleNamespace(id=log_id, job=job, detection=detection, sensor="left", uploaded_by="b")
 
 
 def seen(*names: str, gel: Gel | None = GEL, findings: bool = True) -> Any:
@@ -36,6 +42,12 @@ def seen(*names: str, gel: Gel | None = GEL, findings: bool = True) -> Any:
     return SimpleNamespace(findings=against, gel=gel)
 
 
+def by_key(names: tuple[str, ...], sent_by: str, sensor: str = "right") -> Any:
+    """A log of a sensor that key a has described."""
+    return SimpleNamespace(**vars(log(found=seen(*names))) | {"sensor": sensor, "uploaded_by": sent_by})
+
+
+BY_GEL, ANOTHERS = "reconstructed forces", "another's gel"
 OTHER = replace(GEL, young_modulus=3e5)
 
 
@@ -58,6 +70,11 @@ OTHER = replace(GEL, young_modulus=3e5)
         (log("done", seen("slow frames", gel=OTHER)), False),
         (log("running", seen("reconstructed forces", gel=OTHER), ended=False), False),
         (log("done", None), False),
+        (by_key((BY_GEL, ANOTHERS), "b"), False),
+        (by_key((BY_GEL,), "a"), False),
+        (by_key((), "b"), False),
+        (by_key((BY_GEL,), "b"), True),
+        (by_key((BY_GEL, ANOTHERS), "b", sensor="left"), True),
     ],
 )
 def test_a_job_is_done_again_where_it_may_end_otherwise(given: Any, may_differ: bool) -> None:
