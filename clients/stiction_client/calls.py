@@ -67,6 +67,9 @@ SAMPLE_ARRAYS = (
 PAGE = 1000
 """Entries asked for at once: as many as the service gives."""
 
+PAGE_OF_MATERIALS = 100
+"""Of materials, whose models tell of each sensor: 1,000 with 50 sensors have more than an answer may."""
+
 
 ECHOED = {
     "v": "tangential_velocity",
@@ -189,24 +192,24 @@ def material(name: str) -> Call[Material]:
 
 def materials() -> Call[list[Material]]:
     """Ask for all materials, page after page."""
-    return (yield from _listed("/v1/materials", Material.from_json))
+    return (yield from _listed("/v1/materials", Material.from_json, page=PAGE_OF_MATERIALS))
 
 
 def _listed(
-    path: str, read: Callable[[Mapping[str, Any]], T], most: float = math.inf, **asked: str | None
+    path: str, read: Callable[[Mapping[str, Any]], T], most: float = math.inf, page: int = PAGE, **asked: str | None
 ) -> Call[list[T]]:
-    """Ask for a list, page after page, until there are enough."""
+    """Ask for a list, a ``page`` after the other, until there are enough."""
     found: list[T] = []
     cursor: str | None = None
     known = set[str | None]()
     while True:
-        limit = int(min(PAGE, most - len(found)))
+        limit = int(min(page, most - len(found)))
         answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
-        page, cursor = _record(lambda record: ([read(item) for item in record["items"]], _next(record)), answer)
-        found += page
+        more, cursor = _record(lambda record: ([read(item) for item in record["items"]], _next(record)), answer)
+        found += more
         if cursor is None or len(found) >= most:
             return found
-        if not page or cursor in known:
+        if not more or cursor in known:
             raise UnexpectedAnswer(f"the service's list at {path} does not end")
         known.add(cursor)
 

@@ -13,6 +13,7 @@ from typing import Any, Self
 import httpx
 
 from stiction_client import calls
+from stiction_client.arguments import within
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import ConnectionFailed, InvalidArgument, UnexpectedAnswer
@@ -24,6 +25,9 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 TIMEOUT = 30.0
 """s to wait for more of a request to leave or for an answer to begin, and until that is whole."""
 
+LONGEST_TIMEOUT = 86400.0
+"""s that may be given."""
+
 CONNECT_TIMEOUT = 5.0
 """s; a host that doesn't answer by then isn't there."""
 
@@ -33,8 +37,8 @@ JOB_TIMEOUT = 300.0
 MOST_ANSWER_BYTES = 2**26
 """Bytes of an answer once it is unpacked; a page of a list has some MB."""
 
-ENCODINGS = ("", "identity", "gzip")
-"""How an answer may be packed: others unpack a few bytes to gigabytes at once."""
+UNPACKED = "gzip"
+"""How an answer may be packed: others unpack a few bytes to gigabytes at once, and stay as they are."""
 
 SHOWN_URL = 80
 """Characters of an address that an error shows."""
@@ -519,9 +523,8 @@ class _Content:
         self._content = bytearray()
         seconds = answer.request.extensions["timeout"]["read"]
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds
-        encoding = answer.headers.get("content-encoding", "").strip().lower()
-        if encoding not in ENCODINGS:
-            raise UnexpectedAnswer(f"{answer.request.url} answered in content encoding {encoding!r}; asked for: gzip")
+        if answer.headers.get("content-encoding", "").strip().lower() != UNPACKED:
+            answer.headers.pop("content-encoding", None)
 
     def add(self, part: bytes) -> None:
         self._content += part
@@ -546,11 +549,12 @@ def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]
         raise InvalidArgument(
             "key", "one with other characters", "printable ASCII, as `stiction keys create` prints it"
         )
+    timeout = float(within("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s"))
     with _address_checked(url):
         base_url = httpx.URL(url)
     return {
         "base_url": base_url,
-        "headers": {"Accept-Encoding": "gzip"} | ({"Authorization": f"Bearer {key}"} if key else {}),
+        "headers": {"Accept-Encoding": UNPACKED} | ({"Authorization": f"Bearer {key}"} if key else {}),
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
 

@@ -198,6 +198,11 @@ def test_all_of_a_list_is_asked_for_until_nothing_follows() -> None:
     assert ended == Ended([{"name": "a"}, {"name": "b"}])
 
 
+def test_materials_are_asked_for_in_pages_that_an_answer_holds() -> None:
+    """A model has 0.5 kB of each sensor: 1,000 materials of 50 sensors had more than is taken of an answer."""
+    assert first(calls.materials()).params == {"limit": 100}
+
+
 @pytest.mark.parametrize("second", [{"items": [JOB], "next": "c1"}, {"items": [], "next": "c2"}])
 def test_a_list_that_leads_in_a_circle_or_nowhere_is_left(second: dict[str, Any]) -> None:
     call = calls.jobs(None, 5000)

@@ -1,6 +1,8 @@
 import gzip
 import inspect
 import json
+import math
+import zlib
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -491,8 +493,8 @@ OF_STORE = {"type": "/problems/storage-unavailable", "title": "", "status": 503,
 @pytest.mark.parametrize(
     ("status", "answer"),
     [(502, {"text": "<html>Bad Gateway</html>"}), (504, {"text": ""}), (503, {"text": "<html>"}),
-     (503, {"json": OF_STORE})],
-    ids=["bad gateway", "gateway timeout", "a proxy's 503", "the service's own 503"],
+     (503, {"headers": {"Content-Encoding": "br"}, "stream": httpx.ByteStream(b"page")}), (503, {"json": OF_STORE})],
+    ids=["bad gateway", "gateway timeout", "a proxy's 503", "one that is packed", "the service's own 503"],
 )  # fmt: skip
 def test_behind_a_proxy_that_says_the_service_is_away_the_last_model_is_used(
     answers: SimpleNamespace, status: int, answer: dict[str, Any]
@@ -854,14 +856,31 @@ def test_an_answer_is_packed_as_it_was_asked_for(ask: Ask, answers: SimpleNamesp
 
     def answer(request: httpx.Request) -> httpx.Response:
         asked.append(request)
-        return httpx.Response(200, headers={"Content-Encoding": encoding}, stream=Parts(bytes))
+        packed = zlib.compress(json.dumps(answers.material).encode())
+        return httpx.Response(200, headers={"Content-Encoding": encoding}, stream=httpx.ByteStream(packed))
 
-    with pytest.raises(UnexpectedAnswer, match=f"content encoding '{encoding}'"):
+    with pytest.raises(UnexpectedAnswer, match=r"answered 200 with 'x.*, which is not JSON"):
         ask(answer, "material", "paper")
     assert asked[0].headers["accept-encoding"] == "gzip"
     packed = gzip.compress(json.dumps(answers.material).encode())
     told = httpx.Response(200, headers={"Content-Encoding": "gzip"}, stream=httpx.ByteStream(packed))
     assert ask(lambda _: told, "material", "paper").name == "paper"
+
+
+@pytest.mark.parametrize("encoding", ["br", "deflate"])
+def test_how_a_proxy_packs_nothing_does_not_matter(answers: SimpleNamespace, encoding: str) -> None:
+    headers = {"Content-Encoding": encoding, "ETag": '"1"'}
+    told = [httpx.Response(200, json=answers.material), httpx.Response(304, headers=headers)]
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(lambda _: told.pop(0))) as client:
+        assert client.model("paper") is client.model("paper")
+
+
+@pytest.mark.parametrize("timeout", [math.inf, math.nan, -1.0, 1e10, None, "5"])
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+def test_a_timeout_is_a_time(client: Any, timeout: Any) -> None:
+    """Others ended in errors of the system, at the first call."""
+    with pytest.raises(InvalidArgument, match=r"timeout is .*; allowed: .*0 to 86400 s"):
+        client("http://stiction", timeout=timeout)
 
 
 @pytest.mark.usefixtures("quick")
