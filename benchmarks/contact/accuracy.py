@@ -214,15 +214,16 @@ def reversal(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     return float(max(errors))
 
 
-def torsion(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
+def torsion(grid: Grid, tolerance: float, *, corrected: bool = False, poisson: float = 0.0) -> float:
     """Traction at 0.6 of the sliding moment."""
-    moment = 0.6 * sliding_moment(HERTZ, FRICTION)
-    results = stepped(sphere(0.0), grid, tolerance, [shear(0.0), shear(0.0, moment)])
+    hertz = replace(HERTZ, compliance=reference.half_space(YOUNG, poisson))
+    moment = 0.6 * sliding_moment(hertz, FRICTION)
+    results = stepped(sphere(poisson), grid, tolerance, [shear(0.0), shear(0.0, moment)])
     stress = stresses(results, grid, corrected=corrected)[-1]
     x, y = grid.points()
     r = np.hypot(x, y)
-    around = (x * stress[1] - y * stress[0]) / np.where(r > 0.0, r, 1.0)
-    return relative(around, TorsionPartialSlip(HERTZ, FRICTION, moment).traction(r))
+    around = np.where(r > 0.0, np.stack((-y, x)) / np.where(r > 0.0, r, 1.0), 0.0)
+    return relative(stress[:2], TorsionPartialSlip(hertz, FRICTION, moment).traction(r) * around)
 
 
 CORRECTED = ", corrected"
@@ -233,6 +234,7 @@ _CASES = {
     "Cattaneo–Mindlin": cattaneo_mindlin,
     "unloading and reversal": reversal,
     "torsion": torsion,
+    "torsion, ν = 0.45": partial(torsion, poisson=0.45),
 }
 CLOSED: dict[str, Errors] = {
     name + CORRECTED * corrected: partial(errors, corrected=corrected)

@@ -2,12 +2,16 @@
 
 Pressure ends as K√d, d the distance from the edge (Johnson 1985, §4.2, 5.1), and so does μp − |q| where stick ends.
 Cells of even stress that meet the conditions of contact at their centres have another stress there, by a part of it
-that stays the same on any grid: for this, errors of stress fall with the cell and no faster. That part is the same for
-all bodies. Where cells are small against the contact, bodies respond as 1/r, the edge is straight, and K√d has no
-length of its own, so that how far a cell seems to be from the edge, by the square of its stress over the slope of that,
-less how far it is, depends on this distance and on the edge's angle to the grid alone, in cells. ``edge_cells.csv`` has
-it from a sphere on fine grids (``benchmarks/contact/edge_cells.py``). Where pressure and traction move each other,
-stress does not end as a root, and only a part of the error goes.
+that stays the same on any grid: for this, errors of stress fall with the cell and no faster. That part of pressure is
+the same for all bodies. Where cells are small against the contact, bodies respond as 1/r, the edge is straight, and K√d
+has no length of its own, so that how far a cell seems to be from the edge, by the square of its stress over the slope
+of that, less how far it is, depends on this distance and on the edge's angle to the grid alone, in cells.
+``edge_cells.csv`` has it from a sphere on fine grids of squares (``benchmarks/contact/edge_cells.py``).
+
+Of traction all of that part goes at ν = 0 only. Otherwise bodies respond to it as (1 + η cos 2ψ)/r, ψ the angle to it
+and η = ν/(2 − ν) (Johnson 1985, eq. 3.75): along slip the part is another then, and there is one across slip, which
+stays. Where pressure and traction move each other, stress does not end as a root. In both cases errors become smaller,
+but stay in proportion to the cell.
 """
 
 from collections.abc import Iterable, Iterator
@@ -40,7 +44,8 @@ def centre_forces(results: Iterable[StepResult]) -> Iterator[FloatArray]:
     """Force N [3, ny, nx] that cells, squares, would have of the stress at their centres, in steps from the first on.
 
     Its sum isn't the load: stress between the centres isn't that of an even cell. What an earlier edge of stick left in
-    cells that stick stays, as long as no edge is within ``EDGES.apart`` cells again.
+    cells that stick stays, as long as no edge is within ``EDGES.apart`` cells again; not so what a smaller contact's
+    edge left.
     """
     kept: FloatArray | None = None
     for result in results:
@@ -65,7 +70,7 @@ def _direction_of_slip(along: FloatArray, slides: BoolArray) -> FloatArray:
 
 
 def centre_field(field: FloatArray, inside: BoolArray) -> FloatArray:
-    """Values [ny, nx] at the centres of cells of a field that ends with a root; zero outside of the cells ``inside``.
+    """Values [ny, nx] at the centres of square cells of a field ≥ 0 that ends with a root; zero outside of ``inside``.
 
     Fields that end otherwise, as the pressure of a flat punch does, and cells without enough others around them stay
     as they are.

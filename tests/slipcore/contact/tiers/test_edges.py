@@ -8,6 +8,7 @@ from scipy.special import ellipe, ellipk
 
 from benchmarks.contact.edge_cells import cells_along_edge
 from slipcore.contact import reference
+from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.elasticity.operator import Operators
@@ -42,8 +43,8 @@ def off_centre(cells: int, width: float) -> Grid:
     return Grid((cells, cells), (pitch, pitch), (0.13 * pitch, 0.29 * pitch))
 
 
-def loaded(grid: Grid, loads: list[StepLoad]) -> list[StepResult]:
-    problem = ContactProblem((HalfSpace.from_young(YOUNG, 0.0),), FRICTION, heights=(sphere,))
+def loaded(grid: Grid, loads: list[StepLoad], poisson: float = 0.0) -> list[StepResult]:
+    problem = ContactProblem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=(sphere,))
     return list(QuasiStatic(problem, grid, 1e-7, 1e-9).run(loads))
 
 
@@ -132,14 +133,18 @@ def test_traction_in_partial_slip_is_met(share: float) -> None:
     assert relative(found, exact) < 0.15 * relative(results[-1].force[0] / grid.cell_area, exact)
 
 
-def test_traction_in_torsion_is_met() -> None:
-    grid, moment = off_centre(60, 2.15 * HERTZ.contact_radius), 0.5 * sliding_moment(HERTZ, FRICTION)
-    results = loaded(grid, [shear(0.0), shear(0.0, moment)])
+@pytest.mark.parametrize(("poisson", "least", "most"), [(0.0, 0.0, 0.2), (0.3, 0.1, 0.3), (0.5, 0.2, 0.5)])
+def test_traction_in_torsion_is_met_the_less_the_larger_poisson_s_ratio_is(
+    poisson: float, least: float, most: float
+) -> None:
+    hertz = reference.HertzContact(RADIUS, FORCE, reference.half_space(YOUNG, poisson))
+    grid, moment = off_centre(60, 2.15 * hertz.contact_radius), 0.5 * sliding_moment(hertz, FRICTION)
+    results = loaded(grid, [shear(0.0), shear(0.0, moment)], poisson)
     x, y = grid.points()
     r = np.hypot(x, y)
-    exact = TorsionPartialSlip(HERTZ, FRICTION, moment).traction(r) / r * np.stack((-y, x))
+    exact = TorsionPartialSlip(hertz, FRICTION, moment).traction(r) / r * np.stack((-y, x))
     found = list(centre_forces(results))[-1][:2] / grid.cell_area
-    assert relative(found, exact) < 0.2 * relative(results[-1].force[:2] / grid.cell_area, exact)
+    assert least < relative(found, exact) / relative(results[-1].force[:2] / grid.cell_area, exact) < most
 
 
 def test_what_earlier_edges_of_stick_left_stays_until_a_later_one_passes() -> None:
@@ -166,6 +171,74 @@ def test_traction_that_sticks_all_over_ends_as_pressure_does() -> None:
     exact = 0.24 / 0.7 * FRICTION * (HERTZ.pressure(r) - before.pressure(r))
     found = list(centre_forces(results))[-1][0] / grid.cell_area
     assert relative(found, exact) < 0.8 * relative(results[-1].force[0] / grid.cell_area, exact)
+
+
+def test_traction_of_a_contact_that_grew_while_all_stuck_keeps_what_smaller_ones_left() -> None:
+    grid, paths = off_centre(60, 2.15 * HERTZ.contact_radius), ((0.3, 0.0), (0.3, 0.15), (0.6, 0.3), (1.0, 0.5))
+    loads = [StepLoad(press * FORCE, tangential=np.array([pull * FRICTION * FORCE, 0.0, 0.0])) for press, pull in paths]
+    results = loaded(grid, loads)
+    exact = MindlinDeresiewicz(reference.HertzContact(RADIUS, 0.3 * FORCE, HERTZ.compliance), FRICTION)
+    for press, pull in paths:
+        exact = exact.load(press * FORCE, pull * FRICTION * FORCE)
+    right = exact.traction(np.hypot(*grid.points()))
+    found = list(centre_forces(results))[-1][0] / grid.cell_area
+    assert 0.3 < relative(found, right) / relative(results[-1].force[0] / grid.cell_area, right) < 0.9
+
+
+def test_an_oblique_load_and_one_whose_pressing_falls_are_met_as_well() -> None:
+    grid, along = off_centre(60, 2.15 * HERTZ.contact_radius), np.array([np.cos(4.0), np.sin(4.0), 0.0])
+    paths, exact = ((1.0, 0.0), (1.0, 0.6), (0.7, 0.3), (0.4, 0.1)), MindlinDeresiewicz(HERTZ, FRICTION)
+    results = loaded(
+        grid, [StepLoad(press * FORCE, tangential=pull * FRICTION * FORCE * along) for press, pull in paths]
+    )
+    for (press, pull), result, force in zip(paths, results, centre_forces(results), strict=True):
+        exact = exact.load(press * FORCE, pull * FRICTION * FORCE)
+        right = exact.traction(np.hypot(*grid.points())) * along[:2, None, None]
+        if pull:
+            error = relative(force[:2] / grid.cell_area, right)
+            assert error < 0.2 * relative(result.force[:2] / grid.cell_area, right)
+
+
+@pytest.mark.parametrize(("longer", "most"), [(1.25, 0.2), (2.0, 0.4), (3.0, 0.5)])
+def test_longer_cells_gain_less(longer: float, most: float) -> None:
+    pitch = 2.15 * HERTZ.contact_radius / 80
+    grid = Grid((int(np.ceil(80 / longer)), 80), (pitch, longer * pitch), (0.13 * pitch, 0.29 * longer * pitch))
+    pressure, exact = pressure_on(grid, sphere, FORCE), HERTZ.pressure(np.hypot(*grid.points()))
+    assert relative(centre_field(pressure, pressure > 0.0), exact) < most * relative(pressure, exact)
+
+
+def test_the_pressure_of_a_thin_layer_gains_as_that_of_a_half_space_does() -> None:
+    def on(count: int) -> FloatArray:
+        pitch = 2.3e-3 * 4 / count
+        bodies = (HalfSpace.from_young(YOUNG, 0.45), LayerBase(2e-3, YOUNG, 0.45))
+        grid = Grid((count, count), (pitch, pitch))
+        return solve_normal(Operators(bodies), grid, sphere(*grid.points()), force=FORCE, tolerance=1e-7).pressure
+
+    pressure, fine = on(49), on(5 * 49)
+    exact = centre_field(fine, fine > 0.0)[2::5, 2::5]
+    assert relative(centre_field(pressure, pressure > 0.0), exact) < 0.15 * relative(pressure, exact)
+
+
+def test_parts_that_are_not_numbers_stay_what_they_are_and_arguments_are_not_changed() -> None:
+    grid = off_centre(40, 2.15 * HERTZ.contact_radius)
+    pressure = pressure_on(grid, sphere, FORCE)
+    touches, broken = pressure > 0.0, pressure.copy()
+    where = tuple(np.argwhere(touches)[0])
+    broken[where] = np.nan
+    given = broken.copy(), touches.copy()
+    found = centre_field(broken, touches)
+    assert np.argwhere(np.isnan(found)).tolist() == [list(where)]
+    far = np.hypot(*(np.indices(grid.shape) - np.reshape(where, (2, 1, 1)))) > 12.0
+    np.testing.assert_array_equal(found[far], centre_field(pressure, touches)[far])
+    np.testing.assert_array_equal(broken, given[0])
+    np.testing.assert_array_equal(touches, given[1])
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_units_do_not_matter(factor: float) -> None:
+    pressure = pressure_on(off_centre(40, 2.15 * HERTZ.contact_radius), sphere, FORCE)
+    found = centre_field(factor * pressure, pressure > 0.0)
+    np.testing.assert_allclose(found, factor * centre_field(pressure, pressure > 0.0), rtol=1e-9)
 
 
 @pytest.mark.parametrize("cells", [5, 9, 17, 40])
