@@ -102,9 +102,10 @@ class QuasiStatic:
             state.normal if self._pressed_alike(state, load) else None,
         )
         guess = extrapolated(state.stress, state.before, continuation(state.drive, drive))
+        made = np.zeros_like(state.slip)
         if state.normal is not None and self._moves_sideways(drive):
-            equations, guess = from_touch(equations, state.normal, guess)
-        solution = solve_carrying(equations, self._carried(state, load, drive), guess)
+            equations, guess, made = from_touch(equations, state.normal, guess)
+        solution = solve_carrying(equations, self._carried(state, load, drive), made, guess)
         after = self._advance(equations, state, load, drive, solution, recalled)
         return after, self._result(equations, state, after, solution)
 

@@ -6,7 +6,8 @@ proportional to s − c s′, with s′ the slip of the step before, c = w²/(1 
 So the step's equations stay what they are, with c s′ counted as made already where a cell goes on slipping.
 
 Where slip ends or turns back within the step, and where the rate of a load jumps, there is no rate to go on with: there
-the step is done by backward Euler, whose error in single steps is of second order, too.
+the step is done by backward Euler, whose error in single steps is of second order, too, but where slip ends at once, as
+other cells touch (``touching.py``).
 """
 
 from dataclasses import replace
@@ -27,16 +28,19 @@ def carried_share(before: FloatArray, rate: FloatArray, ratio: float) -> float:
     return ratio**2 / (1.0 + 2.0 * ratio) if steady.all() and ratio <= STEP.longest_step else 0.0
 
 
-def solve_carrying(equations: StepEquations, carried: FloatArray, guess: Stress) -> StepSolution:
-    """The solution of a step's equations with the slip c s′ ``carried`` over [2, ny, nx] m from the step before."""
-    while carried.any():
+def solve_carrying(equations: StepEquations, carried: FloatArray, made: FloatArray, guess: Stress) -> StepSolution:
+    """The solution of a step's equations with the slip c s′ ``carried`` over [2, ny, nx] m from the step before and,
+    where slip ends, with what is ``made`` [2, ny, nx] m of it until then.
+    """
+    may_end = np.any((carried != 0.0) | (made != 0.0), axis=0)
+    while True:
         solution = replace(equations, offset=equations.offset - carried).solve(guess)
         tangential, here = solution.tangential, carried[:, *solution.box]
-        if tangential.sliding and all(equations.load.given):
-            break  # the load does not show how far a sliding contact moves
-        ends = here.any(axis=0) & (~tangential.slides | ((tangential.slip * here).sum(axis=0) < 0.0))
+        if tangential.sliding and all(equations.load.given) and carried.any():
+            return equations.solve(guess)  # the load does not show how far a sliding contact moves
+        ends = may_end[solution.box] & (~tangential.slides | ((tangential.slip * here).sum(axis=0) < 0.0))
         if not ends.any():
             return solution._replace(tangential=tangential._replace(slip=tangential.slip + here))
-        carried, guess = carried.copy(), equations.stress(solution)
-        carried[:, *solution.box] = np.where(ends, 0.0, here)
-    return equations.solve(guess)
+        carried, may_end, guess = carried.copy(), may_end.copy(), equations.stress(solution)
+        carried[:, *solution.box] = np.where(ends, made[:, *solution.box], here)
+        may_end[solution.box] &= ~ends

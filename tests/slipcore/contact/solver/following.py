@@ -56,23 +56,24 @@ def follow_on(
     """
     solver = QuasiStatic(scene, grid, tolerance, 1e-9, second_order=True)
     results = list(solver.run(loads))
-    before = np.zeros((2, *grid.shape))
+    before, touched = np.zeros((2, *grid.shape)), np.zeros(grid.shape, dtype=bool)
     for result in results:
         assert result.iterations <= bound
         assert result.imbalance <= 1e-10
         assert result.residual <= tolerance
         assert result.normal_residual <= 1e-9
         assert np.isfinite(result.displacement).all()
-        assert complementarity(result, solver.friction, before) <= 10.0 * tolerance
-        before = result.slip
+        assert complementarity(result, solver.friction, before, touched) <= 10.0 * tolerance
+        before, touched = result.slip, result.contact
     return results
 
 
-def complementarity(result: StepResult, friction: np.ndarray, before: np.ndarray) -> float:
+def complementarity(result: StepResult, friction: np.ndarray, before: np.ndarray, touched: np.ndarray) -> float:
     """The larger of how far a cell is over its limit and what power friction leaves untaken, both as shares.
 
     Traction is opposite to the rate of slip at the step's end: in a cell that goes on slipping in steps as long as the
-    last, that is s - s'/3, with the slip s' of the step ``before``; else that of the step.
+    last, that is s - s'/3, with the slip s' of the step ``before``; else that of the step, and none in a cell that
+    sticks from when others touch that had not ``touched`` before.
     """
     limit = friction * result.force[2]
     largest, carried = float(limit.max()), float((friction * result.contact).max()) * abs(result.approach)
@@ -80,7 +81,8 @@ def complementarity(result: StepResult, friction: np.ndarray, before: np.ndarray
         return float(np.abs(result.force[:2]).max())
     size, slip = np.hypot(*result.force[:2]), np.hypot(*result.slip)
     going_on, stepped = (untaken(result, limit, rate) for rate in (result.slip - before / 3.0, result.slip))
-    power = float(np.minimum(going_on, stepped).max())
+    ended = touched & (size < 0.999 * limit) & (result.contact & ~touched).any()
+    power = float(np.where(ended, 0.0, np.minimum(going_on, stepped)).max())
     return max(float((size - limit).max()) / largest, power / (largest * max(carried, slip.max())))
 
 
