@@ -107,6 +107,10 @@ class FileDeleted(ProblemError):
     """The log is known, but its upload was old and is deleted."""
 
 
+class PreconditionFailed(ProblemError):
+    """What is to be changed is not as ``If-Match`` says."""
+
+
 class RequestTimeout(ProblemError):
     """The body came too slowly."""
 

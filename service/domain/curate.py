@@ -1,6 +1,6 @@
 """Put right what was stored: names of materials, two that are one, logs that should not count."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from sqlalchemy.orm import Session
 
@@ -38,16 +38,25 @@ def create(session: Session, settings: Settings, name: str, description: str, pr
 
 
 def change(
-    context: Context, material: str, name: str | None, description: str | None, principal: Principal = ANONYMOUS
+    context: Context,
+    material: str,
+    name: str | None,
+    description: str | None,
+    principal: Principal = ANONYMOUS,
+    check: Callable[[Material], None] = lambda _: None,
 ) -> Material:
     """Rename a material, its old name becoming an alias, or change its description.
 
-    Raises ``NotFound``, ``AlreadyExists`` for a name that another material has, ``NotOwner`` or ``InsufficientScope``
-    for who may not, ``QuotaExceeded``, and ``InvalidValue`` for an alias more than a material may have.
+    ``check`` raises where it is not to be changed as it is; nobody else changes it meanwhile. Raises as that,
+    ``NotFound``, ``AlreadyExists`` for a name that another material has, ``NotOwner`` or ``InsufficientScope`` for who
+    may not, ``QuotaExceeded``, and ``InvalidValue`` for an alias more than a material may have.
     """
     with context.database.write() as session:
+        quotas.lock(session, context.settings, principal.key_id)
         material_id = _changeable(session, material, principal)
+        friction_models.lock(session, material_id)
         before = materials.get(session, material)
+        check(before)
         name = None if name == before.name else name
         description = None if description == before.description else description
         if (name, description) != (None, None):

@@ -1,10 +1,14 @@
-"""Answers that need not be sent again to who has them (RFC 9110, 13.1.2)."""
+"""Answers that need not be sent again to who has them, and changes of what is as somebody knows it (RFC 9110, 13.1)."""
 
 import hashlib
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import Request, Response
+from fastapi import Header, Request, Response
+
+from service.http.problems import PRECONDITION_FAILED, Problem
+
+IfMatch = Annotated[str | None, Header(description="Tags (`ETag`) of which what is to be changed has to have one")]
 
 NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
     304: {"description": "What was asked for is what `If-None-Match` says that the client has"}
@@ -38,7 +42,22 @@ def unchanged(tag: str) -> Response:
 
 def tagged(request: Request, body: str) -> Response:
     """The same for a body that has no version of its own."""
-    return conditional(request, f'"{hashlib.blake2b(body.encode(), digest_size=12).hexdigest()}"', lambda: body)
+    return conditional(request, _tag(body), lambda: body)
+
+
+def require_match(if_match: str | None, body: Callable[[], str]) -> None:
+    """Raise ``Problem`` where the tag of a ``body`` that ``tagged`` answers with is none of ``If-Match``; a weak one is
+    never its.
+    """
+    if if_match is None or if_match.strip() == "*":
+        return
+    tag = _tag(body())
+    if tag not in (each.strip() for each in if_match.split(",")):
+        raise Problem.wrong_value(PRECONDITION_FAILED, "If-Match", if_match, tag)
+
+
+def _tag(body: str) -> str:
+    return f'"{hashlib.blake2b(body.encode(), digest_size=12).hexdigest()}"'
 
 
 def is_one_of(tag: str, listed: str) -> bool:

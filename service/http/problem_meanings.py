@@ -106,6 +106,10 @@ MEANINGS: dict[str, ProblemMeaning] = {
         "The log is known, but its upload was old and is deleted.",
         "Send the same file again, which brings it back.",
     ),
+    "precondition-failed": ProblemMeaning(
+        "What is to be changed is not as `If-Match` says. Nothing is done.",
+        "Read it again, and decide anew.",
+    ),
     "upload-too-large": ProblemMeaning(
         "The body is larger than the service takes, or unpacks to more or to too many times its size (settings.md).",
         "Cut the recording.",

@@ -52,6 +52,7 @@ NO_FEASIBLE_FORCE = ProblemType("no-feasible-force", "No normal force holds the 
 JOB_ENDED = ProblemType("job-ended", "The job has ended", 409)
 NOT_READY = ProblemType("not-ready", "The job has not got there", 409)
 FILE_DELETED = ProblemType("file-deleted", "The upload was deleted", 410)
+PRECONDITION_FAILED = ProblemType("precondition-failed", "It has changed meanwhile", 412)
 REQUEST_TIMEOUT = ProblemType("request-timeout", "The request came too slowly", 408)
 MISDIRECTED_REQUEST = ProblemType("misdirected-request", "The request is for another host", 421)
 UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)

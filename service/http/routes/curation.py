@@ -4,15 +4,18 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
+from db.records import Material
 from service.domain import curate
 from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
+from service.http.conditional import IfMatch, require_match
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
     NOT_OWNER,
+    PRECONDITION_FAILED,
     QUOTA_EXCEEDED,
     STORAGE_UNAVAILABLE,
     UNKNOWN_ALIAS,
@@ -38,13 +41,24 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
     tags=["materials"],
     dependencies=[UPLOAD],
     summary="Rename or describe a material",
-    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, QUOTA_EXCEEDED, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, PRECONDITION_FAILED, QUOTA_EXCEEDED, *_BODY),
 )
 def change_material(
-    context: CurrentContext, name: str, change: MaterialChange, principal: CurrentPrincipal
+    context: CurrentContext,
+    name: str,
+    change: MaterialChange,
+    principal: CurrentPrincipal,
+    if_match: IfMatch = None,
 ) -> MaterialOut:
-    """The old name becomes an alias, so that whoever knows it still finds the material."""
-    return MaterialOut.of(curate.change(context, name, change.name, change.description, principal))
+    """The old name becomes an alias, so that whoever knows it still finds the material.
+
+    With `If-Match`, the `ETag` of the material as it was read, only where it is still so.
+    """
+
+    def check(before: Material) -> None:
+        require_match(if_match, lambda: MaterialOut.of(before).model_dump_json())
+
+    return MaterialOut.of(curate.change(context, name, change.name, change.description, principal, check))
 
 
 @router.put(

@@ -38,6 +38,24 @@ def test_what_has_not_changed_is_not_sent_again(reach: Any, path: str, store: Ca
 
 
 @pytest.mark.usefixtures("store")
+def test_a_material_is_changed_only_where_it_is_as_it_was_read(reach: Any) -> None:
+    """Who renamed or described what another had just changed did so unseen."""
+    client = reach("open")
+
+    def change(description: str, if_match: str) -> tuple[int, str]:
+        answer = client.request("PATCH", PATHS[0], json={"description": description}, headers={"If-Match": if_match})
+        assert answer.status_code == 200 or answer.json()["type"] == "/problems/precondition-failed"
+        return answer.status_code, client.get(PATHS[0]).json()["description"]
+
+    first = client.get(PATHS[0]).headers["etag"]
+    assert change("a", f'"other", {first}') == (200, "a")
+    for stale in (first, '"other"', "", f"W/{client.get(PATHS[0]).headers['etag']}"):
+        assert change("b", stale) == (412, "a")
+    assert change("c", client.get(PATHS[0]).headers["etag"]) == (200, "c")
+    assert change("d", "*") == (200, "d")
+
+
+@pytest.mark.usefixtures("store")
 def test_a_tag_stands_for_one_material_and_its_name(reach: Any) -> None:
     client = reach("open")
     tag = client.get(PATHS[1]).headers["etag"]
