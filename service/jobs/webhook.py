@@ -5,9 +5,14 @@ import hashlib
 import hmac
 import json
 import logging
+import socket
+import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import timedelta
+from functools import partial
+from typing import Any
 
 from db.database import Database
 from db.errors import DatabaseError
@@ -118,9 +123,42 @@ class Webhook:
         headers = {"content-type": "application/json", "user-agent": "stiction"}
         if self._secret is not None:
             headers["stiction-signature"] = f"sha256={hmac.new(self._secret, content, hashlib.sha256).hexdigest()}"
-        status = asyncio.run(_answer(str(self._url), content, headers))
+        with asyncio.Runner(loop_factory=_Loop) as runner:
+            status = runner.run(_answer(str(self._url), content, headers))
         if not 200 <= status < 300:
             raise DeliveryFailed(f"the address answered {status} to entry {entry.id} of the audit trail")
+
+
+class _Loop(asyncio.SelectorEventLoop):
+    """Asks for addresses of names in threads that nobody waits for, however long a resolver hangs."""
+
+    async def getaddrinfo(
+        self,
+        host: bytes | str | None,
+        port: bytes | str | int | None,
+        *,
+        family: int = 0,
+        type: int = 0,  # noqa: A002 - as asyncio calls it
+        proto: int = 0,
+        flags: int = 0,
+    ) -> Any:
+        """As ``socket.getaddrinfo``."""
+        found: asyncio.Future[Any] = self.create_future()
+
+        def tell(answer: Callable[[], None]) -> None:
+            if not found.done():
+                answer()
+
+        def resolve() -> None:
+            try:
+                answer = partial(found.set_result, socket.getaddrinfo(host, port, family, type, proto, flags))
+            except (OSError, UnicodeError) as error:
+                answer = partial(found.set_exception, error)
+            with suppress(RuntimeError):  # nobody waits any more
+                self.call_soon_threadsafe(tell, answer)
+
+        threading.Thread(target=resolve, name="webhook's name", daemon=True).start()
+        return await found
 
 
 async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:

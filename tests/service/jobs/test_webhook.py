@@ -3,6 +3,7 @@ import hmac
 import json
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import timedelta
@@ -215,6 +216,35 @@ def test_a_name_that_is_none_is_told_without_it(stored: Database) -> None:
     assert sender.send_new() == 0
     found(stored, "paper")
     with pytest.raises(DeliveryFailed, match=r"cannot be reached \(InvalidCodepoint\)"):
+        sender.send_new()
+
+
+@ONLY_SQLITE
+def test_a_resolver_that_hangs_is_left(stored: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It held whoever sends for 25 s, and a process that was to end."""
+    ended = threading.Event()
+    monkeypatch.setattr(webhook, "TIMEOUT", 0.2)
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: ended.wait(20.0))
+    sender = Webhook(stored, "http://hooks.example/", None, lambda: True)
+    assert sender.send_new() == 0
+    found(stored, "paper")
+    begun = time.monotonic()
+    with pytest.raises(DeliveryFailed, match=r"took longer than 0\.2 s"):
+        sender.send_new()
+    assert time.monotonic() - begun < 10.0
+    ended.set()
+
+
+@ONLY_SQLITE
+def test_a_name_that_nobody_knows_is_told_without_it(stored: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object, **__: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "no such name")
+
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    sender = Webhook(stored, "http://hooks.example/", None, lambda: True)
+    assert sender.send_new() == 0
+    found(stored, "paper")
+    with pytest.raises(DeliveryFailed, match=r"cannot be reached \(ConnectError\)"):
         sender.send_new()
 
 
