@@ -13,11 +13,11 @@ from service.domain.errors import FileDeleted, UnsupportedFormat
 
 @dataclass(frozen=True, slots=True)
 class LogFile:
-    """A file to be sent; ``close`` it after that. ``is_stored``: as it is kept, with the hash of the log."""
+    """A file to be sent, and the hash of its bytes; ``close`` it after that."""
 
     path: Path
     close: ExitStack
-    is_stored: bool = False
+    sha256: str
 
 
 async def export(
@@ -42,11 +42,13 @@ async def export(
                 stored = held.enter_context(await context.threads.run(owner, source.open, "rb"))
             except FileNotFoundError as error:
                 raise FileDeleted(f"the file of grasp log {log.id} has just been deleted") from error
-            return LogFile(Path(f"/dev/fd/{stored.fileno()}"), held.pop_all(), True)  # there, too, once it is deleted
+            there = Path(f"/dev/fd/{stored.fileno()}")  # also once it is deleted
+            return LogFile(there, held.pop_all(), log.sha256)
         await room()
         spool = held.enter_context(context.blobs.spool())
         try:
             await context.readers.write(source, spool.path, name, owner)
         except formats.UnsupportedFormat as error:
             raise UnsupportedFormat(error.name, error.value, error.allowed) from error
-        return LogFile(spool.path, held.pop_all())
+        await context.threads.run(owner, spool.adopt)
+        return LogFile(spool.path, held.pop_all(), spool.sha256)

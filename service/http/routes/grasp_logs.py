@@ -253,21 +253,21 @@ async def read_file(
 ) -> Response:
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit.
 
-    Of the file as it is stored `ETag` and `If-None-Match` save the answer to who has it.
+    `ETag` and `If-None-Match` save the answer to who has it, and `If-Range` goes on with one that broke off.
     """
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
     share, within = principal.share, checked_within(request)
     log = await context.threads.run(share, _find, context, id)
     file = await export(context, log, format, share, room, within)
-    tag = f'"{log.sha256}"'
-    if file.is_stored and is_one_of(tag, request.headers.get("if-none-match", "")):
+    tag = f'"{file.sha256}"'
+    if is_one_of(tag, request.headers.get("if-none-match", "")):
         file.close.close()
         return unchanged(tag)
     return Download(
         file.path,
         file.close.close,
-        headers={"ETag": tag, "Cache-Control": KEEP_AND_ASK} if file.is_stored else None,
+        headers={"ETag": tag, "Cache-Control": KEEP_AND_ASK},
         media_type=formats.FORMATS[format].content_type,
         filename=f"{id}{writing.SUFFIXES[format]}",
     )

@@ -1,8 +1,9 @@
 """A stored log as a file: as it is kept, or written anew, and what is closed at the end."""
 
 import asyncio
+import hashlib
 import os
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -39,7 +40,9 @@ class Stores:
         path = self.path.with_name("spool")
         path.touch()
         try:
-            yield SimpleNamespace(path=path)
+            made = SimpleNamespace(path=path, sha256="")
+            made.adopt = lambda: setattr(made, "sha256", hashlib.sha256(path.read_bytes()).hexdigest())
+            yield made
         finally:
             path.unlink()
 
@@ -62,7 +65,7 @@ def stores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stores:
 
 def test_a_file_of_its_own_format_is_sent_as_it_is_also_once_it_is_deleted(stores: Stores) -> None:
     found = exported(stores, "npz", checked_within=60.0)
-    assert found.is_stored
+    assert found.sha256 == "0"
     assert stores.said == [("files", "key", ["0"], 60.0)]
     stores.path.unlink()
     assert found.path.read_text() == "kept"
@@ -75,7 +78,7 @@ def test_a_file_of_its_own_format_is_sent_as_it_is_also_once_it_is_deleted(store
 def test_another_format_is_made_after_there_is_room_and_goes_at_the_end(stores: Stores) -> None:
     found = exported(stores, "mcap")
     assert stores.said[1:] == ["room", ("write", stores.path, "mcap", "key")]
-    assert (found.is_stored, found.path.read_text()) == (False, "made")
+    assert (found.sha256, found.path.read_text()) == (hashlib.sha256(b"made").hexdigest(), "made")
     found.close.close()
     assert not found.path.exists()
 
@@ -83,7 +86,7 @@ def test_another_format_is_made_after_there_is_room_and_goes_at_the_end(stores: 
 def test_a_file_of_another_format_is_made_into_a_container(stores: Stores, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(formats, "identify", lambda _: "parquet")
     found = exported(stores, "npz")
-    assert (found.is_stored, found.path.read_text()) == (False, "made")
+    assert (found.sha256, found.path.read_text()) == (hashlib.sha256(b"made").hexdigest(), "made")
     found.close.close()
 
 
@@ -101,7 +104,3 @@ def test_a_file_that_is_deleted_is_told_as_such(stores: Stores) -> None:
     stores.path.unlink()
     with pytest.raises(FileDeleted, match=r"^the file of grasp log 7f has just been deleted$"):
         exported(stores, "npz")
-
-
-def test_a_file_is_closed_once() -> None:
-    assert LogFile(Path("x"), ExitStack()).is_stored is False

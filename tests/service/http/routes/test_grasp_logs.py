@@ -161,6 +161,19 @@ def test_a_log_is_downloaded_in_each_format_bit_for_bit(
     wait_for_empty_spool(client)
 
 
+@pytest.mark.parametrize("name", ["npz", "parquet", "mcap"])
+def test_a_download_that_broke_off_is_gone_on_with(client: httpx.Client, fitted: dict[str, Any], name: str) -> None:
+    """Files that are made had the time of that in their tag, so that they came whole each time."""
+    path = f"/v1/grasp-logs/{fitted['id']}/file?format={name}"
+    whole = client.get(path)
+    tag = whole.headers["etag"]
+    assert tag == f'"{hashlib.sha256(whole.content).hexdigest()}"'
+    part = client.get(path, headers={"Range": "bytes=100-", "If-Range": tag})
+    assert (part.status_code, part.content) == (206, whole.content[100:])
+    assert client.get(path, headers={"If-None-Match": tag}).status_code == httpx.codes.NOT_MODIFIED
+    wait_for_empty_spool(client)
+
+
 def test_a_log_with_the_grippers_force_is_returned_as_it_was_sent(
     client: httpx.Client, ramp: GraspLog, upload: Upload, wait: Wait
 ) -> None:
