@@ -1,5 +1,6 @@
 """A live stream of tactile frames to the service: slip states and friction come back (extra ``stream``)."""
 
+import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -19,6 +20,12 @@ from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedA
 
 RESUMABLE = (1001, 1006, 1012, 4503)
 """Codes of a connection after whose end its session goes on: the server stops or cannot store now."""
+
+IN_USE = 4409
+"""Code of a session that has a connection, as of one whose end the service has not noticed yet."""
+
+IN_USE_PAUSES = (0.05, 0.2, 1.0)
+"""s after which it is asked for again."""
 
 MOST_FORCE = 1e4
 """N that a gripper may report."""
@@ -197,14 +204,28 @@ class SlipStream:
         except ConnectionClosed as error:
             if error.rcvd is not None and error.rcvd.code not in RESUMABLE:  # the service said why
                 raise _refused(error) from error
-        self.close()
-        self._connection = self._connect({"type": "resume", "session": self._session, "last": self._answered})
-        for _, content in self._waiting:
-            self._connection.send(content)
+        self._connection = self._resume()
         try:
+            for _, content in self._waiting:
+                self._connection.send(content)
             return do()
         except ConnectionClosed as error:
             raise _refused(error) from error
+
+    def _resume(self) -> ClientConnection:
+        """A new connection of the session, where the last one broke."""
+        opening = {"type": "resume", "session": self._session, "last": self._answered}
+        for pause in IN_USE_PAUSES:
+            self.close()
+            try:
+                return self._connect(opening)
+            except ConnectionFailed as error:
+                closed = error.__cause__
+                if not isinstance(closed, ConnectionClosed) or closed.rcvd is None or closed.rcvd.code != IN_USE:
+                    raise
+            time.sleep(pause)
+        self.close()
+        return self._connect(opening)
 
     def _read(self, timeout: float) -> dict[str, Any]:
         try:

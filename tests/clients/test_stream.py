@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -15,6 +16,7 @@ from stiction_client.stream import SlipStream
 
 OPENED = {"type": "opened", "session": "s"}
 BROKEN = ConnectionClosedError(None, None)
+IN_USE = ConnectionClosedError(Close(4409, "the session has a connection already"), None)
 Answers = list[dict[str, Any] | Exception]
 
 
@@ -45,7 +47,8 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[SlipStream, l
         @contextmanager
         def connect(url: str, **_: Any) -> Iterator[Connection]:
             assert url == "ws://service/v1/stream"
-            made.append(Connection([OPENED, *answers[len(made)]]))
+            given = answers[len(made)]
+            made.append(Connection(given if IN_USE in given else [OPENED, *given]))
             yield made[-1]
             made[-1].is_open = False
 
@@ -74,6 +77,36 @@ def test_an_answer_that_was_lost_comes_on_the_next_connection(opened: Any) -> No
     assert second.sent[0] == {"type": "resume", "session": "s", "last": 0}
     assert second.sent[1:] == first.sent[2:]
     assert (first.is_open, second.is_open) == (False, True)
+
+
+@pytest.mark.parametrize("times", [1, 3, 4])
+def test_a_session_whose_old_connection_is_still_there_is_waited_for(
+    opened: Any, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    """A service notices the end of one later than its client: a robot's loop ended by that."""
+    slept: list[float] = []
+    monkeypatch.setattr(stream, "time", SimpleNamespace(sleep=slept.append))
+    live, made = opened([BROKEN], *[[IN_USE] for _ in range(times)], [state(0)])
+    send(live, 1)
+    with nullcontext() if times < 4 else pytest.raises(ConnectionFailed, match="has a connection already"):
+        assert live.receive() == state(0)
+    assert slept == list(stream.IN_USE_PAUSES[:times])
+    assert [each.is_open for each in made] == [False] * min(times + 1, 4) + [True]
+
+
+def test_a_connection_that_breaks_again_at_once_is_told(opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the library's own error, while frames were sent again."""
+    live, made = opened([BROKEN], [])
+    send(live, 2)
+
+    def broken(_: Connection, content: bytes) -> None:
+        if msgspec.msgpack.decode(content)["type"] == "frame":
+            raise BROKEN
+
+    monkeypatch.setattr(Connection, "send", broken)
+    with pytest.raises(ConnectionFailed):
+        live.receive()
+    assert len(made) == 2
 
 
 def test_what_becomes_of_a_log_is_told_although_the_connection_broke(opened: Any) -> None:
