@@ -2,10 +2,17 @@
 
 import multiprocessing
 import os
+import runpy
+import site
+import sys
+import threading
+from collections.abc import Callable
 from contextlib import chdir
 from functools import cache
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
+from multiprocessing.connection import wait
 from multiprocessing.context import ForkServerContext, ForkServerProcess
+from multiprocessing.process import BaseProcess
 from multiprocessing.reduction import DupFd
 from pathlib import Path
 from typing import Any
@@ -63,3 +70,42 @@ def begin() -> None:
     first = context.Process(target=int)
     first.start()
     first.join()
+
+
+def exit_code(target: Callable[..., object], *given: object, seconds: float = 120.0) -> int | None:
+    """Of a process that does this; ``seconds`` are only against waiting for ever."""
+    process = Context().Process(target=target, args=given)
+    process.start()
+    process.join(seconds)
+    process.kill()
+    process.join()
+    return process.exitcode
+
+
+def start_module(command: tuple[str, ...], environment: dict[str, str], log: Path) -> BaseProcess:
+    """``python -m command`` with more in its environment, and its outputs in the log."""
+    begin()
+    process = multiprocessing.get_context("forkserver").Process(target=_run_module, args=(command, environment, log))
+    process.start()
+    return process
+
+
+def _run_module(command: tuple[str, ...], environment: dict[str, str], log: Path) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    resource_tracker._resource_tracker.__init__()  # its own one tells of what a killed process leaves in its own log
+    with log.open("ab") as stream:
+        for output in OUTPUTS:
+            os.dup2(stream.fileno(), output)
+    os.environ.update(environment)
+    sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
+    sys.modules.pop("sitecustomize", None)  # Debian's Python has one of its own, which was imported before the path was
+    site.execsitecustomize()  # as at the start of an interpreter
+    sys.argv[:] = command
+    runpy.run_module(command[0], run_name="__main__", alter_sys=True)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

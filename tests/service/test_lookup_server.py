@@ -6,8 +6,6 @@ import os
 import re
 import signal
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from service.lookup_server import LookupServer, server_of
 from service.processes import spawned
 from service.serving import Server
 from service.settings import Settings
+from tests import forking
 from tests.waiting import wait_until
 
 DASHBOARD = re.compile(r"the dashboard is at (\S+)/$", re.MULTILINE)
@@ -31,23 +30,22 @@ class Service:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self._log = folder, folder / "log"
-        command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--lookup-port", "0"]
+        command = ("service.cli", "serve", "--port", "0", "--lookup-port", "0")
         settings = {
             "STICTION_DATA_FOLDER": str(folder / "data"),
             "STICTION_WORKERS": "0",
             "STICTION_SHUTDOWN_SECONDS": "3",  # longer than the wait before a lost process is started anew
         }
-        with self._log.open("w") as log:
-            self.process = subprocess.Popen(command, env=os.environ | settings, stderr=log)
-        wait_until(lambda: LOOK_UPS.search(self.log) or self.process.poll() is not None, "the start")
-        assert self.process.poll() is None, self.log
+        self.process = forking.start_module(command, settings, self._log)
+        wait_until(lambda: LOOK_UPS.search(self.log) or not self.process.is_alive(), "the start")
+        assert self.process.is_alive(), self.log
         found = DASHBOARD.search(self.log)
         assert found is not None
         self.url = found[1]
 
     @property
     def log(self) -> str:
-        return self._log.read_text()
+        return self._log.read_text() if self._log.exists() else ""
 
     @property
     def look_ups(self) -> tuple[str, int]:
@@ -61,7 +59,7 @@ def service(tmp_path: Path) -> Iterator[Service]:
     running = Service(tmp_path)
     yield running
     running.process.kill()
-    running.process.wait()
+    running.process.join()
 
 
 def is_gone(process: int) -> bool:
@@ -87,7 +85,8 @@ def test_look_ups_have_a_process_that_is_started_anew_and_ends_with_the_server(s
     assert "ERROR service.lookup_server: the process that answers look-ups is started anew" in service.log
 
     service.process.terminate()
-    service.process.wait(PATIENCE)
+    service.process.join(PATIENCE)
+    assert not service.process.is_alive()
     assert is_gone(second)
     assert f"Finished server process [{second}]" in service.log
     assert "Traceback" not in service.log
@@ -103,7 +102,8 @@ def test_a_signal_to_all_processes_ends_them_and_starts_none(service: Service) -
         wait_until(lambda: list((service.folder / "data/spool").iterdir()), "the upload to begin", 30.0)
         service.process.terminate()
         os.kill(process, signal.SIGTERM)
-        service.process.wait(PATIENCE)
+        service.process.join(PATIENCE)
+    assert not service.process.is_alive()
     assert is_gone(process)
     assert service.look_ups == (address, process)
     assert "started anew" not in service.log
@@ -113,7 +113,7 @@ def test_the_process_ends_when_the_server_is_killed(service: Service) -> None:
     address, process = service.look_ups
     httpx.get(f"{address}/healthz", timeout=PATIENCE).raise_for_status()
     service.process.kill()
-    service.process.wait()
+    service.process.join()
     wait_until(lambda: is_gone(process), "the process to end", PATIENCE)
 
 

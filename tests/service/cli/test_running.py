@@ -1,6 +1,3 @@
-import os
-import subprocess
-import sys
 import webbrowser
 from pathlib import Path
 
@@ -8,6 +5,7 @@ import pytest
 
 from service.cli import main
 from service.cli.exit_codes import INPUT_REFUSED
+from tests import forking
 
 
 @pytest.mark.parametrize(
@@ -24,17 +22,20 @@ from service.cli.exit_codes import INPUT_REFUSED
     ],
     ids=["folder", "database", "host", "address", "lookup_port"],
 )
-def test_the_last_line_of_a_refused_start_says_what_is_wrong(tmp_path: Path, wrong: list[str], why: str) -> None:
-    environment = os.environ | {
-        "STICTION_DATA_FOLDER": str(tmp_path),
-        "STICTION_WORKERS": "0",
-        "STICTION_ACCESS": "open",
-    }
-    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", *wrong]
-    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
-    assert (ended.returncode, "Traceback" in ended.stderr) == (INPUT_REFUSED, False)
-    assert ended.stderr.splitlines()[-1].startswith("stiction: ")
-    assert why in ended.stderr.splitlines()[-1]
+def test_the_last_line_of_a_refused_start_says_what_is_wrong(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    wrong: list[str],
+    why: str,
+) -> None:
+    for name, value in {"DATA_FOLDER": str(tmp_path), "WORKERS": "0", "ACCESS": "open"}.items():
+        monkeypatch.setenv(f"STICTION_{name}", value)
+    ended = forking.exit_code(main, ["serve", "--port", "0", *wrong])
+    told = capfd.readouterr().err
+    assert (ended, "Traceback" in told) == (INPUT_REFUSED, False)
+    assert told.splitlines()[-1].startswith("stiction: ")
+    assert why in told.splitlines()[-1]
 
 
 @pytest.mark.parametrize("has_browser", [True, False])

@@ -1,21 +1,13 @@
 """A fleet of real processes on one database and one data folder, and what must hold of what they leave behind."""
 
 import hashlib
-import multiprocessing
-import os
-import runpy
-import site
 import socket
-import sys
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
-from multiprocessing import resource_tracker
-from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -63,28 +55,6 @@ def is_alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
-
-
-def run_module(command: tuple[str, ...], environment: dict[str, str], log: Path) -> None:
-    """``python -m command`` in a process that has the imports behind it already."""
-    threading.Thread(target=end_with_parent, daemon=True).start()
-    resource_tracker._resource_tracker.__init__()  # its own one tells of what a killed process leaves in its own log
-    with log.open("ab") as stream:
-        for output in (1, 2):
-            os.dup2(stream.fileno(), output)
-    os.environ.update(environment)
-    sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
-    sys.modules.pop("sitecustomize", None)  # Debian's Python has one of its own, which was imported before the path was
-    site.execsitecustomize()  # as at the start of an interpreter
-    sys.argv[:] = command
-    runpy.run_module(command[0], run_name="__main__", alter_sys=True)
-
-
-def end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
 
 
 class Server:
@@ -139,8 +109,6 @@ class Fleet:
         self.database = Database(database_url)
         self.servers: dict[Server, BaseProcess] = {}
         self.workers: list[BaseProcess] = []
-        forking.begin()
-        self._context = multiprocessing.get_context("forkserver")
         self.environment = {
             "STICTION_DATA_FOLDER": str(folder),
             "STICTION_DATABASE_URL": database_url,
@@ -170,9 +138,7 @@ class Fleet:
 
     def _start(self, *command: str, workers: int, **environment: str) -> BaseProcess:
         environment = self.environment | {"STICTION_WORKERS": str(workers)} | environment
-        process = self._context.Process(target=run_module, args=(command, environment, self.log))
-        process.start()
-        return process
+        return forking.start_module(command, environment, self.log)
 
     def work(self) -> BaseProcess:
         """Start a worker, and do not wait until it is warm."""

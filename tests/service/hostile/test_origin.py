@@ -1,9 +1,6 @@
 """What a page of another site, or a proxy that strangers come through, gets of a service that asks nobody for a key."""
 
 import asyncio
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -12,8 +9,11 @@ from typing import Any
 import httpx
 import pytest
 
+from service.cli import main
+from service.cli.exit_codes import INPUT_REFUSED
 from service.serving import configuration
 from service.settings import Settings
+from tests import forking
 
 Reach = Callable[..., Any]
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -142,12 +142,14 @@ def test_only_a_proxy_that_is_named_says_for_whom_it_asks(
     assert seen_address(Settings(trusted_proxies=trusted), "10.0.0.9") == expected
 
 
-def test_a_start_that_is_refused_says_why_in_a_line(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "service.cli", "serve", "--host", "0.0.0.0", "--port", "0"]
-    environment = os.environ | {"STICTION_DATA_FOLDER": str(tmp_path), "STICTION_WORKERS": "0"}
-    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 3
-    assert "host is 0.0.0.0, access is auto, and there are no keys; allowed: make one with `stiction keys create`" in (
-        ended.stderr
+def test_a_start_that_is_refused_says_why_in_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
+    monkeypatch.setenv("STICTION_WORKERS", "0")
+    assert forking.exit_code(main, ["serve", "--host", "0.0.0.0", "--port", "0"]) == INPUT_REFUSED == 3
+    told = capfd.readouterr().err
+    assert (
+        "host is 0.0.0.0, access is auto, and there are no keys; allowed: make one with `stiction keys create`" in told
     )
-    assert "Traceback" not in ended.stderr
+    assert "Traceback" not in told

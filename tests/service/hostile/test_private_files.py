@@ -1,27 +1,26 @@
 """What other users of the machine can read of what the service keeps."""
 
-import os
 import stat
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests import forking
+
 SCRIPT = """
-import os, sys
-os.umask(int(sys.argv[1], 8))
+import os
+os.umask(umask)
 from fastapi.testclient import TestClient
 from service.app import create_app
 from service.settings import Settings
 with TestClient(create_app(Settings(workers=0)), base_url="http://127.0.0.1", client=("127.0.0.1", 1)) as client:
-    content = open(sys.argv[2], "rb").read()
+    content = open(log, "rb").read()
     type = {"content-type": "application/vnd.stiction.grasp-log+npz"}
     answer = client.post("/v1/grasp-logs", content=content, headers=type)
     assert answer.status_code == 202, answer.text
     from service import cli
     try:
-        cli.main(["db", "backup", sys.argv[3]])
+        cli.main(["db", "backup", copy])
     except SystemExit as ended:
         assert not ended.code
     else:
@@ -30,13 +29,13 @@ with TestClient(create_app(Settings(workers=0)), base_url="http://127.0.0.1", cl
 
 
 @pytest.mark.parametrize("umask", ["000", "022"])
-def test_no_file_or_folder_is_for_others_whatever_the_umask(tmp_path: Path, content: bytes, umask: str) -> None:
+def test_no_file_or_folder_is_for_others_whatever_the_umask(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes, umask: str
+) -> None:
     log, data, copy = tmp_path / "log.npz", tmp_path / "data", tmp_path / "copy"
     log.write_bytes(content)
-    environment = os.environ | {"STICTION_DATA_FOLDER": str(data)}
-    command = [sys.executable, "-c", SCRIPT, umask, str(log), str(copy)]
-    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
-    assert ended.returncode == 0, ended.stderr
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(data))
+    assert forking.exit_code(exec, SCRIPT, {"umask": int(umask, 8), "log": str(log), "copy": str(copy)}) == 0
     made = [data, copy, *data.rglob("*"), *copy.rglob("*")]
     modes = {stat.S_IMODE(path.stat().st_mode) for path in made if path.is_dir()}
     assert modes == {0o750}

@@ -1,7 +1,9 @@
 """That processes forked for the tests are what new interpreters would be, and sooner."""
 
 import os
+import signal
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -31,6 +33,11 @@ def test_a_process_has_what_is_there_when_it_starts(
     finally:
         os.umask(before)
     assert capfd.readouterr().err.startswith("said")
+
+
+def test_a_process_is_told_of_by_its_exit_code_and_does_not_go_on_for_ever() -> None:
+    assert forking.exit_code(sys.exit, 3) == 3
+    assert forking.exit_code(time.sleep, 600.0, seconds=0.01) == -signal.SIGKILL
 
 
 def test_processes_of_servers_begin_warm() -> None:
