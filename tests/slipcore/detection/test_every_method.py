@@ -77,11 +77,12 @@ AS_GIVEN = {"marker_kernel": 0.0, "force_kernel": 0.0}
 
 def check_streaming_is_batch(log: GraspLog, method: str, same_history: Same) -> None:
     batch = detect_slip(log, method, **(AS_GIVEN if method == DEFAULT_METHOD else {}))
-    same_history(with_patches(log, stream(log, method)), batch)
+    streamed = stream(log, method)
+    same_history(with_patches(log, streamed), batch)
     cut, stored = cut_everywhere(log, method)
-    same_history(with_patches(log, cut), batch)
+    same_history(cut, streamed)
     for start in (1, len(log) // 3, len(log) - 1):
-        same_history(with_patches(log, resumed(log, stored[start], start, batch, method)), batch)
+        same_history(resumed(log, stored[start], start, streamed, method), streamed)
 
 
 @EACH_METHOD
