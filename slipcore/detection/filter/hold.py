@@ -46,6 +46,22 @@ def step_hold(
 
 
 @compiled
+def keeps_contact(
+    frame: FrameArrays, noise: tuple[float, float], has_force: bool, tuning: Tuning, common: FloatArray
+) -> bool:
+    """Whether elements touch as they did, since all was held in the last frame and the load has not changed since.
+
+    By noise alone elements at the rim would come and go, and each would begin at the place that the jitter of the
+    fitted pose gives it: where noise lasts, this is a random walk of the pose. ``noise``: variance of a marker
+    coordinate m², and deviation of an element's force N. A contact that is given is that.
+    """
+    if frame.contact.size or common[STILL] <= tuning.hold_time:
+        return False
+    load, variance = load_of(frame, has_force, noise[0], noise[1], tuning)
+    return not changed(load, variance, tuning, common)
+
+
+@compiled
 def load_of(
     frame: FrameArrays, has_force: bool, variance: float, force_noise: float, tuning: Tuning
 ) -> tuple[tuple[float, float, float], float]:

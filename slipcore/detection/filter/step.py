@@ -9,7 +9,7 @@ from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.heading import follow_headings
-from slipcore.detection.filter.hold import step_hold
+from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
@@ -57,6 +57,9 @@ def step_filter(
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
         after.common[DOUBTED_FRAMES] += 0.0 if has_force else 1.0
+    if keeps_contact(frame, noise_of_frame(room.surface, tuning), has_force, tuning, before.common):
+        after.contact[:] = before.contact
+        room.surface.stays[:] = before.contact
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last says nothing
         after.elements[ONSET] = after.elements[END] = 0.0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.detector.scenes import simulated, tuning
+from service.slip_benchmark.faults import correlated
 from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 
@@ -33,10 +34,9 @@ def held(log: GraspLog, frames: int, rate: float, marker_noise: float, inputs: s
     )
 
 
-def ramp(schedule: RampSchedule, frame_rate: float = 30.0) -> GraspLog:
-    return tangential_ramp(
-        tangential_force=0.6 if schedule.shear else 0.0, schedule=schedule, points=10, pitch=2e-3, frame_rate=frame_rate
-    )
+def ramp(schedule: RampSchedule, points: int = 10) -> GraspLog:
+    force, pitch = 0.6 if schedule.shear else 0.0, 2e-2 / points
+    return tangential_ramp(tangential_force=force, schedule=schedule, points=points, pitch=pitch, frame_rate=30.0)
 
 
 def share(history: SlipHistory) -> np.ndarray:
@@ -51,6 +51,15 @@ def test_a_grasp_that_only_presses_never_slips(inputs: str, marker_noise: float,
     history = detect_slip(held(ramp(PRESS), frames, rate, marker_noise, inputs))
     assert history.slip.sum() <= 0.005 * history.contact.sum()
     assert share(history)[-1] <= 0.005
+
+
+def test_noise_that_lasts_neither_moves_the_contact_of_a_hold_nor_makes_it_slip() -> None:
+    """Elements that come and go at the rim begin where the fitted pose jitters to, which then walks."""
+    log = held(ramp(PRESS, points=20), 900, 30.0, 1e-6, "displacement")
+    history = detect_slip(correlated(1e-5)(log, np.random.default_rng(1)))
+    assert (history.contact[-600:] == history.contact[-1]).all()
+    assert history.contact[-1].any()
+    assert history.slip.sum() <= 0.005 * history.contact.sum()
 
 
 @pytest.mark.long

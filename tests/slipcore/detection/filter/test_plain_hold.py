@@ -84,6 +84,21 @@ def test_without_anchors_nothing_is_remembered_and_without_forces_depth_counts()
     assert still([0.0] * 5, [0.0, 0.0, 0.0, 0.0, 1e-6], np.zeros(COMMON), has_force=False)[-1]
 
 
+@pytest.mark.parametrize(
+    ("still", "load", "given", "keeps"),
+    [(0.3, 1.0, False, True), (0.25, 1.0, False, False), (0.3, 1.02, False, False), (0.3, 1.0, True, False)],
+)
+def test_elements_touch_as_they_did_while_all_is_held_and_the_load_stays(
+    still: float, load: float, given: bool, keeps: bool
+) -> None:
+    """Of 1 N with a noise of 1 mN, in the mean of four frames; a contact that is given is that."""
+    common, field = np.zeros(COMMON), np.zeros((1, 1, 3))
+    common[STILL], common[HELD_FRAMES], common[HELD_LOAD + 2], field[0, 0, 2] = still, 4.0, 1.0, load
+    contact = np.ones((1, 1), bool) if given else NO_MASK
+    frame = FrameArrays(0.0, field, field, NO_POSE, field, contact)
+    assert unwrap(hold.keeps_contact)(frame, (1e-12, 1e-3), True, TUNING, common) == keeps
+
+
 def resticks(
     change: tuple[float, float, float], friction: tuple[float, float] = (0.0, 0.0), noise: float = 1e-3
 ) -> tuple[bool, np.ndarray]:
