@@ -4,7 +4,7 @@ import math
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.pose import Anchors, Pose, PoseVariance, place_of_object, pose_at
-from slipcore.detection.filter.state import HELD_FRAMES, HELD_LOAD, HELD_POSE, STILL
+from slipcore.detection.filter.state import HELD_FRAMES, HELD_LOAD, HELD_POSE, LASTING, STILL
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
@@ -51,11 +51,11 @@ def keeps_contact(
 ) -> bool:
     """Whether elements touch as they did, since all was held in the last frame and the load has not changed since.
 
-    By noise alone elements at the rim would come and go, and each would begin at the place that the jitter of the
-    fitted pose gives it: where noise lasts, this is a random walk of the pose. ``noise``: variance of a marker
-    coordinate m², and deviation of an element's force N. A contact that is given is that.
+    By noise that lasts elements at the rim of a shape come and go, and each would begin at the place that the jitter of
+    the fitted pose gives it: a random walk of the pose. ``noise``: variance of a marker coordinate m², and deviation of
+    an element's force N. Contact by forces is known better, and one that is given is that.
     """
-    if frame.contact.size or common[STILL] <= tuning.hold_time:
+    if has_force or frame.contact.size or common[LASTING] == 0.0 or common[STILL] <= tuning.hold_time:
         return False
     load, variance = load_of(frame, has_force, noise[0], noise[1], tuning)
     return not changed(load, variance, tuning, common)

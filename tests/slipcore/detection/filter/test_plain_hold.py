@@ -9,7 +9,7 @@ import pytest
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter import hold, loading, pose
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, PoseVariance, pose_at
-from slipcore.detection.filter.state import COMMON, FRICTION, HELD_FRAMES, HELD_LOAD, HELD_POSE, LOADING, STILL
+from slipcore.detection.filter.state import COMMON, FRICTION, HELD_FRAMES, HELD_LOAD, HELD_POSE, LASTING, LOADING, STILL
 from slipcore.detection.filter.tuning import Tuning, settings_of
 from slipcore.detection.shared.records import NO_MASK, NO_POSE, FrameArrays
 from tests.slipcore.plain_kernels import as_plain_python
@@ -85,18 +85,26 @@ def test_without_anchors_nothing_is_remembered_and_without_forces_depth_counts()
 
 
 @pytest.mark.parametrize(
-    ("still", "load", "given", "keeps"),
-    [(0.3, 1.0, False, True), (0.25, 1.0, False, False), (0.3, 1.02, False, False), (0.3, 1.0, True, False)],
+    ("still", "load", "lasting", "has_force", "given", "keeps"),
+    [
+        (0.3, 1.0, 5e-6, False, False, True),
+        (0.25, 1.0, 5e-6, False, False, False),
+        (0.3, 1.00002, 5e-6, False, False, False),
+        (0.3, 1.0, 0.0, False, False, False),
+        (0.3, 1.0, 5e-6, True, False, False),
+        (0.3, 1.0, 5e-6, False, True, False),
+    ],
 )
-def test_elements_touch_as_they_did_while_all_is_held_and_the_load_stays(
-    still: float, load: float, given: bool, keeps: bool
+def test_elements_touch_by_shape_as_they_did_while_all_is_held_and_noise_lasts(
+    still: float, load: float, lasting: float, has_force: bool, given: bool, keeps: bool
 ) -> None:
-    """Of 1 N with a noise of 1 mN, in the mean of four frames; a contact that is given is that."""
+    """Of 1 m of depth with a noise of 1 µm, in the mean of four frames."""
     common, field = np.zeros(COMMON), np.zeros((1, 1, 3))
     common[STILL], common[HELD_FRAMES], common[HELD_LOAD + 2], field[0, 0, 2] = still, 4.0, 1.0, load
+    common[LASTING] = lasting
     contact = np.ones((1, 1), bool) if given else NO_MASK
     frame = FrameArrays(0.0, field, field, NO_POSE, field, contact)
-    assert unwrap(hold.keeps_contact)(frame, (1e-12, 1e-3), True, TUNING, common) == keeps
+    assert unwrap(hold.keeps_contact)(frame, (1e-12, 1e-3), has_force, TUNING, common) == keeps
 
 
 def resticks(
