@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.special import iv
+from scipy.optimize import brentq
+from scipy.special import ellipkm1, iv
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
@@ -61,6 +62,37 @@ def test_a_punch_that_cannot_slip_presses_as_mossakovskii_has_it(poisson: float)
     assert stuck.stick_ratio == 1.0
     exact = (1.0 - poisson) * np.log(3.0 - 4.0 * poisson) / (1.0 - 2.0 * poisson)
     assert stuck.force[2].sum() / smooth.force[2].sum() == pytest.approx(exact, rel=3e-3)  # 32 cells: 2.1e-3 at ν = 0
+
+
+def spence(share: float) -> float:
+    """Stick area over contact area under pressing with friction μ = ``share`` β, β Dundurs': with k = c/a the root of
+    ln((1 + k)/(1 − k))/2k = (μ/β) K(√(1 − k²)), alike for a flat punch and a sphere (Spence, J. Elasticity 5 (1975)
+    297); tractions that move no pressure are assumed, as next to ν = ½.
+    """
+    ring = brentq(lambda k: np.log((1.0 + k) / (1.0 - k)) / (2.0 * k) - share * ellipkm1(k**2), 1e-6, 1.0 - 1e-9)
+    return float(ring) ** 2
+
+
+def dundurs(poisson: float) -> float:
+    return (1.0 - 2.0 * poisson) / (2.0 * (1.0 - poisson))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.7, 0.9])
+def test_a_pressed_punch_slips_in_spences_ring(share: float) -> None:
+    result = pushed(problem(0.48, share * dundurs(0.48), round_punch, coupled=True), 64)
+    assert result.stick_ratio == pytest.approx(spence(share), abs=6e-3)  # a row of cells is 0.05 of the area
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_a_pressed_sphere_comes_to_slip_in_spences_ring_with_its_load_steps(share: float) -> None:
+    """Of first order in the steps: cells that slip at a step's begin and stick at its end count as slipping."""
+    scene, errors = problem(0.48, share * dundurs(0.48), coupled=True), []
+    width = 2.3 * HertzContact(RADIUS, FORCE, half_space(YOUNG, 0.48)).contact_radius
+    for steps in (8, 32):
+        loads = [at(FORCE * (step / steps) ** 3) for step in range(1, steps + 1)]
+        last = follow(scene, loads, 64, width, bound=60, tolerance=1e-6)[-1]
+        errors.append(abs(last.stick_ratio - spence(share)))
+    assert errors[1] < min(0.03, 0.5 * errors[0])
 
 
 def test_dundurs_beta_of_minus_a_half_mirrors_that_of_a_half() -> None:
