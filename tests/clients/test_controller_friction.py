@@ -224,5 +224,5 @@ def test_no_material_is_called_unknown_and_of_none_nothing_is_recognised() -> No
 def test_samples_that_say_the_same_without_any_error_refute_nothing() -> None:
     certain = KnownFriction(FLAT, FrictionQuantile(0.5, 0.0, 0.0, 0.0, 0.0), 0.5, deviations=2.0, of_others=True)
     exact = replace(SETTINGS, learned_error=0.0, sample_error=0.0)
-    assert not certain.refuted(learned(0.5, 0.5), 0.0, 2.0, exact)
-    assert certain.refuted(learned(0.499, 0.499), 0.0, 2.0, exact)
+    assert not certain.refuted(learned(0.5, 0.5), LoadEstimate(), 2.0, exact)
+    assert certain.refuted(learned(0.499, 0.499), LoadEstimate(), 2.0, exact)

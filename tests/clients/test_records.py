@@ -111,7 +111,7 @@ def test_friction_is_no_number_that_cannot_be() -> None:
 
 def test_what_a_material_is_recognised_by_is_told_where_it_is_doubtful() -> None:
     paper = {"material": "paper", "probability": 0.75, "support": "supported", "advice": "fine", "method": "bayes"}
-    felt = {"material": "felt", "probability": "0.2", "support": "stale", "advice": "fit it"}
+    felt = {"material": "felt", "probability": 0.2, "support": "stale", "advice": "fit it"}
     wood = {"material": "wood", "probability": 0}
     found = Recognition.from_json({"method": "ols", "unknown": 0.05, "candidates": [paper, felt, wood]})
     assert found.probability == {"paper": 0.75, "felt": 0.2, "wood": 0.0}

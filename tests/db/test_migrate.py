@@ -394,7 +394,6 @@ def test_a_table_that_someone_changed_is_named(database: Database) -> None:
         migrate.check(database)
 
 
-@ONLY_SQLITE
 def test_who_described_a_sensor_before_that_was_noted_is_known_by_the_audit_trail(database: Database) -> None:
     """Else logs of the very sensors whose gels somebody had described wrongly said nothing of it."""
     gel = Gel(2e5, 0.48, None, 0.0)
@@ -414,6 +413,7 @@ def test_who_described_a_sensor_before_that_was_noted_is_known_by_the_audit_trai
     assert found == {"left": "robotrobot", "right": None, "thumb": None, "other": None, "bare": None}
 
 
+@ONLY_SQLITE
 def test_a_migration_that_breaks_references_is_named(database: Database) -> None:
     row = "'1', 'fit', 'queued', '{}', 99, 'ols', 0, 0, '2026-01-01'"
     columns = "id, kind, status, seconds, material_id, method, seed, deaths, created_at"
