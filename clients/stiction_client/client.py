@@ -1,7 +1,6 @@
 """The two clients, one waiting and one awaiting: they carry out what ``calls`` describes."""
 
 import asyncio
-import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -521,8 +520,7 @@ class _Content:
     def __init__(self, answer: httpx.Response) -> None:
         self._answer = answer
         self._content = bytearray()
-        seconds = answer.request.extensions["timeout"]["read"]
-        self._deadline = math.inf if seconds is None else time.monotonic() + seconds
+        self._deadline = time.monotonic() + answer.request.extensions["timeout"]["read"]
         if answer.headers.get("content-encoding", "").strip().lower() != UNPACKED:
             answer.headers.pop("content-encoding", None)
 

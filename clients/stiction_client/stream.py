@@ -133,7 +133,7 @@ class SlipStream:
         """
         answer: dict[str, Any] = self._try(lambda: self._read(timeout))
         number = answer.get("number")
-        if not isinstance(number, int) or not self._answered < number < self._number or not _is_of_force(answer):
+        if not isinstance(number, int) or not self._answered < number < self._number or not _has_sound_command(answer):
             raise self._unexpected(answer)
         self._answered = number
         while self._waiting and self._waiting[0][0] <= self._answered:
@@ -245,8 +245,8 @@ class SlipStream:
         return UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
 
 
-def _is_of_force(answer: Mapping[str, Any]) -> bool:
-    """Whether what it commands, if it does, is a force: a hand presses with it."""
+def _has_sound_command(answer: Mapping[str, Any]) -> bool:
+    """Whether the command of an answer, if it has one, is a force that a gripper can press with."""
     if answer.get("command") is None:
         return True
     try:

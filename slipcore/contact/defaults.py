@@ -284,6 +284,7 @@ class EdgeDefaults(Options):
     table_reach: Annotated[float, Option(0.5, 5.0, "√cells", "the excess falls as 1/d beyond")] = 1.4
     """Of ``tiers/edge_cells.csv``: root of the largest distance."""
     rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-9
+    """Of the squares in a window, added where its cells are too few for a parabola."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

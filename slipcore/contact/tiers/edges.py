@@ -124,6 +124,9 @@ def _depth(inside: BoolArray) -> tuple[FloatArray, FloatArray]:
 def _parabolas(inside: BoolArray, near: BoolArray) -> tuple[NDArray[np.int64], FloatArray]:
     """Places [cells, k] on the padded grid around the cells ``near``, and what gives value and slope [cells, 3, k] at
     these by the parabola through a field in those around them that are inside (least squares).
+
+    By normal equations: a window that cells determine has a condition number of 195 at most, in cells, and 10 inside,
+    so that its square leaves eleven digits.
     """
     reach = int(EDGES.window)
     offsets = np.indices((2 * reach + 1, 2 * reach + 1)).reshape(2, -1) - reach
