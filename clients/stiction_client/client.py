@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import httpx
 
-from stiction_client import calls
+from stiction_client import calls, heads
 from stiction_client.arguments import within
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
@@ -48,12 +48,12 @@ class FrictionClient:
 
     ``url`` and ``key``, sent as ``Authorization: Bearer``, are by default those of the environment, ``STICTION_URL``
     and ``STICTION_KEY``, or this machine's service without a key; ``timeout`` s holds for each wait; ``transport``
-    replaces the network, as in tests. An answer is whole ``timeout`` s after its head, or it counts as a broken
-    connection, and has 64 MiB at most. Where the connection breaks or the service is busy or away (429; 502, 503, 504),
-    a request is tried three times, not before the service asks for it; the service does it once: what would be done
-    again is tried again only where it was not done (429, 503). Models are kept: one younger than ``stale_after`` s
-    isn't asked for again, an older one isn't sent again unless it changed, and where the service can't be reached, or a
-    proxy says so, the last one is used with a ``StaleModel`` warning.
+    replaces the network, as in tests. The head of an answer is whole ``timeout`` s after the request has left, and all
+    of it as long after, or it counts as a broken connection; it has 64 MiB at most. Where the connection breaks or the
+    service is busy or away (429; 502, 503, 504), a request is tried three times, not before the service asks for it;
+    the service does it once: what would be done again is tried again only where it was not done (429, 503). Models are
+    kept: one younger than ``stale_after`` s isn't asked for again, an older one isn't sent again unless it changed, and
+    where the service can't be reached, or a proxy says so, the last one is used with a ``StaleModel`` warning.
 
     Every call raises ``ConnectionFailed``, ``ProblemError`` (the service refused) or ``UnexpectedAnswer``.
     """
@@ -574,9 +574,8 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
         "If-None-Match": request.tag,
     }
     headers = {name: value for name, value in given.items() if value is not None}
-    limits = http.timeout.as_dict()
-    if limits["read"] is not None:
-        limits["read"] += request.wait_seconds
+    answered_within = (http.timeout.read or 0.0) + request.wait_seconds
+    bounded = heads.bounded_async if isinstance(http, httpx.AsyncClient) else heads.bounded
     with _address_checked(request.path):
         return http.build_request(
             request.method,
@@ -585,7 +584,8 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
             json=request.json,
             content=request.content,
             headers=headers,
-            timeout=httpx.Timeout(**limits),
+            timeout=httpx.Timeout(**http.timeout.as_dict() | {"read": answered_within}),
+            extensions={"trace": bounded(answered_within)},
         )
 
 
