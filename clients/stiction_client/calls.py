@@ -296,7 +296,11 @@ def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
     return _record(lambda record: GraspLogReceipt.from_json(record["grasp_log"]), (yield from _ask(request)))
 
 
-def friction(name: str, question: Mapping[str, float | str | None]) -> Call[FrictionAnswer]:
+Names = set[tuple[str, str]]
+"""Names that a client asked for materials by, each with the material's own, as the service said once."""
+
+
+def friction(name: str, question: Mapping[str, float | str | None], known: Names) -> Call[FrictionAnswer]:
     """Look friction up."""
     asked = _given(**question)
     answer = _record(FrictionAnswer.from_json, (yield from _get(f"/v1/materials/{_part(name)}/friction", asked)))
@@ -304,16 +308,16 @@ def friction(name: str, question: Mapping[str, float | str | None]) -> Call[Fric
     if told.get("of") == "element":
         told.pop("elements", None)  # of one, whatever was said
     _require_same(told, answer)
-    yield from _require_named(name, answer.material)
+    yield from _require_named(name, answer.material, known)
     return answer
 
 
-def next_grasp(name: str, working_point: Mapping[str, float | str | None]) -> Call[NextGrasp]:
+def next_grasp(name: str, working_point: Mapping[str, float | str | None], known: Names) -> Call[NextGrasp]:
     """Ask what to record next."""
     asked = _given(**working_point)
     answer = _record(NextGrasp.from_json, (yield from _get(f"/v1/materials/{_part(name)}/next-grasp", asked)))
     _require_same(_given(method=working_point.get("method")), answer)
-    yield from _require_named(name, answer.material)
+    yield from _require_named(name, answer.material, known)
     return answer
 
 
@@ -523,12 +527,13 @@ def _job(job_id: str, record: Any) -> Job:
     return found
 
 
-def _require_named(name: str, answered: str) -> Call[None]:
-    """Ask whether a material that is asked for by ``name`` is the one that was ``answered``, by its own name."""
-    if answered != name:
+def _require_named(name: str, answered: str, known: Names) -> Call[None]:
+    """Ask, once, whether a material that is asked for by ``name`` is the one that was ``answered``, by its own name."""
+    if answered != name and (name, answered) not in known:
         record = yield from _get(f"/v1/materials/{_part(name)}")
         if answered not in (_material(name, record).name, *_aliases(record)):
             raise UnexpectedAnswer(f"the answer is to another question: of material {answered!r}, asked {name!r}")
+        known.add((name, answered))
 
 
 def _require_same(asked: Mapping[str, str | float], answer: Any) -> None:

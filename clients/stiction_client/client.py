@@ -192,7 +192,7 @@ class FrictionClient:
         """
         asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
         bounds = {"load": load, "drop_probability": drop_probability}
-        return self._run(calls.next_grasp(name, asked | bounds))
+        return self._run(calls.next_grasp(name, asked | bounds, self._names))
 
     def recognise(
         self,
@@ -311,6 +311,7 @@ class AsyncFrictionClient:
         stale_after: float = 0.0,
     ) -> None:
         self._kept: dict[str, calls.CachedModel] = {}
+        self._names: calls.Names = set()
         self._stale_after = stale_after
         self._http = httpx.AsyncClient(**_options(url, key, timeout), transport=transport)
 
@@ -399,7 +400,9 @@ class AsyncFrictionClient:
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
         asked = {"v": v, "fn": fn, "quantile": quantile, "method": method, "of": of, "elements": elements}
-        return await self._run(calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}))
+        return await self._run(
+            calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}, self._names)
+        )
 
     async def next_grasp(
         self,
@@ -416,7 +419,7 @@ class AsyncFrictionClient:
         """As ``FrictionClient.next_grasp``."""
         asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
         bounds = {"load": load, "drop_probability": drop_probability}
-        return await self._run(calls.next_grasp(name, asked | bounds))
+        return await self._run(calls.next_grasp(name, asked | bounds, self._names))
 
     async def recognise(
         self,
@@ -514,19 +517,28 @@ class AsyncFrictionClient:
 class _Content:
     """The content of an answer as it comes, within bounds, whoever answers.
 
-    Raises ``UnexpectedAnswer`` for more than a service says, and ``httpx.ReadTimeout`` for what takes too long.
+    Raises ``UnexpectedAnswer`` for more than a service says, ``httpx.ReadTimeout`` for what takes too long, and
+    ``httpx.DecodingError`` for what is not packed as it says, or ends before that does.
     """
 
     def __init__(self, answer: httpx.Response) -> None:
         self._answer = answer
         self._content = bytearray()
         self._deadline = time.monotonic() + answer.request.extensions["timeout"]["read"]
-        if answer.headers.get("content-encoding", "").strip().lower() != UNPACKED:
-            answer.headers.pop("content-encoding", None)
+        packed = answer.headers.pop("content-encoding", "").strip().lower()  # else it would come without its end, too
+        is_packed = packed == UNPACKED and not answer.is_stream_consumed
+        self._unpacker = zlib.decompressobj(GZIP) if is_packed else None
+        self._has_begun = False
 
     def add(self, part: bytes) -> None:
-        self._content += part
         request = self._answer.request
+        if self._unpacker is not None:
+            self._has_begun |= bool(part)
+            try:
+                part = self._unpacker.decompress(part, MOST_ANSWER_BYTES + 1 - len(self._content))
+            except zlib.error as error:
+                raise httpx.DecodingError(f"the answer is no gzip stream: {error}", request=request) from error
+        self._content += part
         if len(self._content) > MOST_ANSWER_BYTES:
             raise UnexpectedAnswer(f"{request.url} answered with more than {MOST_ANSWER_BYTES} bytes")
         if time.monotonic() > self._deadline:

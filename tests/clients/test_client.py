@@ -910,3 +910,14 @@ def test_an_answers_charset_does_not_matter(ask: Ask, charset: str) -> None:
     told = {"Content-Type": f"application/json; charset={charset}"}
     with pytest.raises(UnexpectedAnswer, match="answered 400"):
         ask(lambda _: httpx.Response(400, headers=told, content=b"\xff\xff"), "material", "paper")
+
+
+def test_a_client_asks_once_what_an_alias_names(answers: SimpleNamespace, service: Service) -> None:
+    """A planner that looked up by an alias asked twice each time, and the second answer is no service's from memory."""
+    server = service(answers.friction, answers.material, answers.friction)
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(server)) as client:
+        for _ in range(3):
+            assert client.friction("paper 80.g", 0.0, 0.05, 0.05).material == "paper"
+    assert [request.url.path.rpartition("/")[2] for request in server.requests] == ["friction", "paper 80.g"] + [
+        "friction"
+    ] * 2
