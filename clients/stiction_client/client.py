@@ -3,6 +3,7 @@
 import asyncio
 import os
 import time
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import aclosing, closing, contextmanager
 from pathlib import Path
@@ -39,6 +40,9 @@ MOST_ANSWER_BYTES = 2**26
 UNPACKED = "gzip"
 """How an answer may be packed: others unpack a few bytes to gigabytes at once, and stay as they are."""
 
+GZIP = zlib.MAX_WBITS | 16
+"""By which zlib knows that format."""
+
 SHOWN_URL = 80
 """Characters of an address that an error shows."""
 
@@ -68,6 +72,7 @@ class FrictionClient:
         stale_after: float = 0.0,
     ) -> None:
         self._kept: dict[str, calls.CachedModel] = {}
+        self._names: calls.Names = set()
         self._stale_after = stale_after
         self._http = httpx.Client(**_options(url, key, timeout), transport=transport)
 
@@ -171,7 +176,7 @@ class FrictionClient:
         are of ``element_area`` m², the model's where it is not given (``answer.element_area``).
         """
         asked = {"v": v, "fn": fn, "quantile": quantile, "method": method, "of": of, "elements": elements}
-        return self._run(calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}))
+        return self._run(calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}, self._names))
 
     def next_grasp(
         self,
@@ -546,10 +551,10 @@ class _Content:
 
     def whole(self) -> httpx.Response:
         """The answer with its content, unpacked."""
-        headers = self._answer.headers.copy()
-        headers.pop("content-encoding", None)
-        status, content = self._answer.status_code, bytes(self._content)
-        return httpx.Response(status, headers=headers, content=content, request=self._answer.request)
+        status, headers, request = self._answer.status_code, self._answer.headers, self._answer.request
+        if self._unpacker is not None and self._has_begun and not self._unpacker.eof:
+            raise httpx.DecodingError("the answer is a gzip stream without its end", request=request)
+        return httpx.Response(status, headers=headers, content=bytes(self._content), request=request)
 
 
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:

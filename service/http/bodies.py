@@ -137,6 +137,9 @@ class JsonRoute(FairRoute):
             if media_type(request) != "application/json":
                 given = request.headers.get("content-type") or "missing"
                 raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given, "application/json")
+            packed = ", ".join(request.headers.getlist("content-encoding"))
+            if packed.strip().lower() not in ("", "identity"):
+                raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content encoding", packed, "none: JSON comes unpacked")
             async with AsyncExitStack() as held:
                 return await handle(_JsonRequest(request.scope, limited(request.receive, self.most_bytes), held))
 

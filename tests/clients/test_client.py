@@ -921,3 +921,20 @@ def test_a_client_asks_once_what_an_alias_names(answers: SimpleNamespace, servic
     assert [request.url.path.rpartition("/")[2] for request in server.requests] == ["friction", "paper 80.g"] + [
         "friction"
     ] * 2
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(("cut", "told"), [(-9, "gzip stream without its end"), (2, "without its end")])
+def test_a_packed_answer_without_its_end_is_a_broken_connection(
+    ask: Ask, answers: SimpleNamespace, cut: int, told: str
+) -> None:
+    """It was told as one that is no JSON, or even taken for whole where only its check sum was missing."""
+    packed, asked = gzip.compress(json.dumps(answers.material).encode()), list[httpx.Request]()
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        return httpx.Response(200, headers={"Content-Encoding": "gzip"}, stream=httpx.ByteStream(packed[:cut]))
+
+    with pytest.raises(ConnectionFailed, match=told):
+        ask(answer, "material", "paper")
+    assert len(asked) == 3

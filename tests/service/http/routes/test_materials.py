@@ -1,3 +1,4 @@
+import gzip
 from collections.abc import Callable
 from typing import Any
 
@@ -249,3 +250,16 @@ def test_a_description_that_no_database_holds_is_refused(client: httpx.Client, d
     answer = client.post("/v1/materials", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 422
     assert answer.json()["name"] == "description"
+
+
+@pytest.mark.parametrize("cut", [None, -9])
+def test_json_that_is_packed_is_refused_as_that(client: httpx.Client, cut: int | None) -> None:
+    """It was told as JSON in another encoding than UTF-8."""
+    headers = {"content-type": "application/json", "content-encoding": "gzip"}
+    packed = gzip.compress(b'{"name": "paper"}')[:cut]
+    response = client.post("/v1/materials", content=packed, headers=headers)
+    told = response.json()
+    assert (response.status_code, told["type"]) == (415, "/problems/unsupported-format")
+    assert (told["name"], told["value"]) == ("content encoding", "gzip")
+    plain = client.post("/v1/materials", json={"name": "not packed"}, headers={"content-encoding": "Identity"})
+    assert plain.status_code in {201, 409}
