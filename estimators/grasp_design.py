@@ -72,6 +72,10 @@ class Probing:
     force_spread: float = DESIGN.force_spread
     velocity_spread: float = DESIGN.velocity_spread
 
+    def __post_init__(self) -> None:
+        if not 0.0 < self.drop_probability <= 0.5:
+            raise InvalidSamples("drop_probability", self.drop_probability, "above 0, at most 0.5")
+
 
 @dataclass(frozen=True, slots=True)
 class NextGrasp:

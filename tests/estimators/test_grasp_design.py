@@ -186,3 +186,10 @@ def test_forces_go_from_half_of_the_least_to_twice_the_largest_seen_with_the_wor
     assert beyond.max() == pytest.approx(0.7)
     chosen = _forces(known, POINT, replace(probing, normal_force=(0.2, 0.3)))
     assert (chosen.min(), chosen.max(), chosen[-1]) == (pytest.approx(0.2), pytest.approx(0.3), 0.2)
+
+
+@pytest.mark.parametrize("probability", [0.0, -0.1, 0.6, 1.0, math.nan])
+def test_a_probability_of_dropping_the_load_is_refused_by_its_own_name(probability: float) -> None:
+    """It was by that of the quantile at which the model is asked."""
+    with pytest.raises(InvalidSamples, match="drop_probability is"):
+        next_grasp(model(), POINT, Probing(load=1.0, drop_probability=probability))
