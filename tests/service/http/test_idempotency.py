@@ -11,8 +11,10 @@ from sqlalchemy import func, select
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
-from db.repositories import grasp_logs, jobs, materials
+from db.repositories import access_keys, grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
+from service.domain import keys
+from service.http import authentication
 from service.http.idempotency import IdempotencyKey, RepeatableResponse, respond_once
 from tests.forking import Context
 
@@ -153,3 +155,18 @@ def test_processes_that_ask_the_same_at_once_do_it_once(database: Database, blob
         process.join()
     assert given[0] == given[1] == given[2]
     assert (count(database, GraspLogRow), count(database, JobRow)) == (1, 1)
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_what_was_answered_is_no_answer_to_a_key_that_was_revoked_since(
+    reach: Reach, make: Callable[..., str], database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", -1.0)
+    text = make("upload")
+    client = reach(key=text)
+    made, again = [send(client, "/v1/materials", json={"name": "paper"}) for _ in range(2)]
+    assert (made.status_code, again.status_code, again.content) == (201, 201, made.content)
+    with database.write() as session:
+        access_keys.revoke(session, keys.key_id(text) or "")
+    refused = send(client, "/v1/materials", json={"name": "paper"})
+    assert (refused.status_code, refused.json()["type"]) == (401, "/problems/invalid-key")
