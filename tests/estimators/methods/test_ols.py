@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy import stats
+from statsmodels.regression.linear_model import OLS, WLS
 
 import estimators
 from estimators.defaults import LINEAR, REFERENCE
@@ -30,7 +30,7 @@ def test_coefficients_and_errors_are_those_of_statsmodels(samples: Make) -> None
     model = estimators.fit(data)
     effective = weight.sum() ** 2 / (weight @ weight)
     relative = weight * weight.sum() / (weight @ weight)
-    reference = sm.WLS(data.friction_coefficient, design(data), weights=relative).fit()
+    reference = WLS(data.friction_coefficient, design(data), weights=relative).fit()
     # pinv of statsmodels loses some digits on unscaled columns; 1e-9 is far above that and far below any mistake
     np.testing.assert_allclose(model.coefficients, reference.params, rtol=1e-9)
     shrunk = np.sqrt((300 - 3) / (effective - 3))  # Kish's count stands for n
@@ -144,7 +144,7 @@ def test_constant_velocity_leaves_its_slope_open_and_prediction_valid(samples: M
     assert model.identifiable[0] == (speed == 0.0)  # away from v = 0, the unknown slope carries β₀ with it
     assert model.coefficients[1] == 0.0  # the smallest slope that fits
     np.testing.assert_allclose(model.standard_errors[1], 1.0 / REFERENCE.tangential_velocity, rtol=1e-9)
-    without = sm.OLS(data.friction_coefficient, design(data)[:, [0, 2]]).fit()
+    without = OLS(data.friction_coefficient, design(data)[:, [0, 2]]).fit()
     expected = without.predict([[1.0, 0.05]])[0]
     np.testing.assert_allclose(model.predict(speed, 0.05), expected, rtol=1e-9)
     width = model.predict(speed, 0.05, 0.95) - model.predict(speed, 0.05, 0.05)

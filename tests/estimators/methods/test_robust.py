@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 from scipy import stats
+from statsmodels.regression.linear_model import WLS
+from statsmodels.robust.norms import HuberT
 
 import estimators
 from estimators.linear import m_estimate
@@ -73,11 +74,11 @@ def test_huber_is_that_of_statsmodels_at_the_same_scale(samples: Make) -> None:
     x = np.column_stack([np.ones(300), data.tangential_velocity * 1e3, data.normal_force])
     start = m_estimate.high_breakdown(x, data.friction_coefficient, np.random.default_rng(0))
     ours, _, settled = m_estimate._m_step(x, data.friction_coefficient, np.ones(300), start, m_estimate.LOSSES["huber"])
-    norm = sm.robust.norms.HuberT()
+    norm = HuberT()
     wanted = start.coefficients
     for _ in range(200):  # statsmodels' weights, at the scale that ours keeps fixed
         weight = norm.weights((data.friction_coefficient - x @ wanted) / start.scale)
-        wanted = sm.WLS(data.friction_coefficient, x, weights=weight).fit().params
+        wanted = WLS(data.friction_coefficient, x, weights=weight).fit().params
     assert settled
     np.testing.assert_allclose(ours.coefficients, wanted, rtol=1e-6)
 
