@@ -68,15 +68,16 @@ class ObjectStore:
     def hashes(self, before: datetime | None = None, *, set_aside: bool = False) -> Iterator[str]:
         """Hashes of all blobs, or of those that were stored before a moment of the store's clock.
 
-        Either of the blobs in their places, or of those ``set_aside``.
+        Either of the blobs in their places, or of those ``set_aside``. What else is under the URL is another's, and be
+        it the blobs of a store in a folder of this one.
         """
+        place = _aside if set_aside else _key
         with _answered("blob store"):
-            for page in self._obstore.list(self._store):
+            for page in self._obstore.list(self._store, prefix=_QUARANTINE if set_aside else None):
                 for entry in page:
-                    folder, _, name = entry["path"].rpartition("/")
-                    is_aside = folder.rpartition("/")[2] == _QUARANTINE
+                    name = entry["path"].rpartition("/")[2]
                     is_old = before is None or entry["last_modified"] < before
-                    if _SHA256.fullmatch(name) and is_old and is_aside == set_aside:
+                    if _SHA256.fullmatch(name) and entry["path"] == place(name) and is_old:
                         yield name
 
     def delete(self, hashes: Iterable[str], *, set_aside: bool = False) -> None:

@@ -148,3 +148,23 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: 
 def test_a_url_that_no_store_has_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StorageUnavailable, match="blob store"):
         open_blobs(tmp_path, "gopher://grasps")
+
+
+@pytest.mark.parametrize(("url", "inner"), [("s3://grasps", "lab/"), ("s3://grasps/lab", "old/"), ("s3://grasps", "")])
+def test_a_store_sees_its_own_blobs_and_not_those_of_one_in_a_folder_of_it(
+    s3: Any, tmp_path: Path, url: str, inner: str
+) -> None:
+    """A sweep at a bucket's root took them for blobs to which nothing refers."""
+    blobs = open_blobs(tmp_path / "own", url, MIB)
+    own, aside = (blobs.put(content) for content in (b"own", b"aside"))
+    blobs.quarantine.put(aside)
+    other = open_blobs(tmp_path / "other", f"{url}/{inner or 'ab/'}", MIB)
+    for content in (b"theirs", b"theirs aside"):
+        theirs = other.put(content)
+    other.quarantine.put(theirs)
+    assert list(blobs.hashes()) == [own]
+    assert list(blobs.quarantine.hashes()) == [aside]
+    kept = set(s3.objects)
+    blobs.quarantine.delete([theirs])
+    blobs.remove([theirs])
+    assert set(s3.objects) == kept
