@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
-from sqlalchemy import ColumnElement, Row, Select, delete, func, select, update
+from sqlalchemy import ColumnElement, Row, Select, String, cast, delete, func, select, update
 from sqlalchemy.orm import Session
 
 from db.records import ContactFriction, Detection, Finding, Gel, SampledLog, SamplesOfLog, SampleSummary, Signature
@@ -74,6 +74,15 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
 def logs_that_count(session: Session, material_id: int) -> Sequence[Row[Any]]:
     """What ``samples_of_material`` goes by, with each log's ``id``, of which little is read: the same while that is."""
     return session.execute(_of_samples(_WHICH, material_id).order_by(GraspLogRow.number, GraspLogRow.id)).all()
+
+
+def state_of_logs(session: Session, material_id: int) -> str:
+    """A text that is another one once ``logs_that_count`` says something else, in a fraction of its time."""
+    found_at = cast(SampleSummaryRow.created_at, String)
+    log = GraspLogRow.id + cast(GraspLogRow.sensor_id, String) + SampleSummaryRow.samples_blob + found_at
+    counting = select(log.label("log")).join(SampleSummaryRow).where(*_that_count(material_id))
+    ordered = counting.order_by(GraspLogRow.number, GraspLogRow.id).subquery()
+    return session.scalar(select(func.aggregate_strings(ordered.c.log, ";"))) or ""
 
 
 def others_of_grasp(session: Session, log_id: str, fingerprints: Collection[str]) -> list[str]:

@@ -235,7 +235,7 @@ def fit_material(run: Run) -> None:
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
-            counting = detections.logs_that_count(session, material_id) if is_still else []
+            counting = _logs_by_now(session, material_id, basis) if is_still else []
             if counting == basis.logs or (counting and tries >= MOST_REPEATS):
                 _store_models(run, session, material_id, models, basis.logs, counting)
                 return
@@ -251,10 +251,11 @@ def _with_forces(run: Run, log: GraspLog, gel: Gel | None) -> "tuple[GraspLog, R
 
 
 class Basis(NamedTuple):
-    """What a material is fitted by: its logs that count, by which it is known while they are the same, their samples,
-    how much grasps may differ before its own show it, and its current models by method.
+    """What a material is fitted by: its logs that count, the ``state`` by which it is known while they are the same,
+    their samples, how much grasps may differ before its own show it, and its current models by method.
     """
 
+    state: str
     logs: Sequence[Row[Any]]
     parts: list[SamplesOfLog]
     prior: ScatterPrior
@@ -264,6 +265,7 @@ class Basis(NamedTuple):
 def _basis(run: Run, session: Session, material_id: int) -> Basis:
     before = friction_models.all_current(session, [material_id]).get(material_id, [])
     return Basis(
+        detections.state_of_logs(session, material_id),
         detections.logs_that_count(session, material_id),
         detections.samples_of_material(session, material_id),
         prior_from_others(session, material_id) if run.others_tell else ScatterPrior(),
@@ -271,9 +273,15 @@ def _basis(run: Run, session: Session, material_id: int) -> Basis:
     )
 
 
+def _logs_by_now(session: Session, material_id: int, basis: Basis) -> Sequence[Row[Any]]:
+    """Those of a material that count, of which all are read only where they are others than those of the basis."""
+    is_same = detections.state_of_logs(session, material_id) == basis.state
+    return basis.logs if is_same else detections.logs_that_count(session, material_id)
+
+
 def _fit(run: Run, basis: Basis) -> list[FrictionModel]:
     """The models of the job's methods."""
-    _, parts, prior, before = basis
+    parts, prior, before = basis.parts, basis.prior, basis.before
     if not parts:
         raise InsufficientData("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"

@@ -69,7 +69,7 @@ def test_whether_the_same_logs_count_is_told_without_what_is_long(
     with database.write() as session:
         material = materials.create(session, "paper", "").id
     ids = [add(database, new_log(material)) for _ in range(2)]
-    seen = list[Any]()
+    seen, states = list[Any](), list[str]()
     changes: list[Callable[[Session], object]] = [
         lambda session: detections.add(session, ids[0], detection, samples),
         lambda session: detections.add(session, ids[1], detection, samples),
@@ -85,9 +85,12 @@ def test_whether_the_same_logs_count_is_told_without_what_is_long(
         with database.read() as session:
             found = detections.logs_that_count(session, material)
             assert detections.logs_that_count(session, material) == found
+            states.append(detections.state_of_logs(session, material))
+            assert detections.state_of_logs(session, material) == states[-1]
         assert not any(name in statement for statement in statements for name in ("alike", "moments", "findings"))
         assert found not in seen
         seen.append(found)
+    assert len(set(states)) == len(changes)
     assert [[log.id for log in found] for found in seen] == [ids[:1], ids, ids[1:], ids, ids[:1], ids[:1]]
 
 
