@@ -96,6 +96,11 @@ class Finding:
     remedy: str
     severity: str | None = None
 
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Finding":
+        """The finding in the service's answer."""
+        return cls(**_values(cls, record))
+
 
 @dataclass(frozen=True, slots=True)
 class ContactFriction:
@@ -140,7 +145,7 @@ class Detection:
         if values.get("corrections") is not None:
             values["corrections"] = tuple(values["corrections"])
         if values.get("findings") is not None:
-            values["findings"] = tuple(Finding(**_values(Finding, each)) for each in values["findings"])
+            values["findings"] = tuple(Finding.from_json(each) for each in values["findings"])
         if values.get("contact_friction") is not None:
             values["contact_friction"] = ContactFriction(**_values(ContactFriction, values["contact_friction"]))
         return cls(**values)

@@ -17,6 +17,7 @@ from stiction_client import recorded
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
+from stiction_client.records import Finding
 
 RESUMABLE = (1001, 1006, 1012, 4503)
 """Codes of a connection after whose end its session goes on: the server stops or cannot store now."""
@@ -66,6 +67,7 @@ class SlipStream:
         self._headers = {"Authorization": f"Bearer {key}"} if key else {}
         self._open = ExitStack()
         self._session, self._number, self._answered = "", 0, -1
+        self._findings: tuple[Finding, ...] = ()
         self._waiting: deque[tuple[int, bytes]] = deque()
         opening: dict[str, Any] = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2]}
         opening |= {"element_area": within("element_area", element_area, 0.0, 1.0, "m²")}
@@ -88,6 +90,11 @@ class SlipStream:
     def session(self) -> str:
         """The session's name; the service shows it to people at ``/live/`` and this."""
         return self._session
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is to be known of the sensor's gel, by which forces are reconstructed where frames have none."""
+        return self._findings
 
     def close(self) -> None:
         """End the connection; the session waits a minute for another."""
@@ -194,6 +201,10 @@ class SlipStream:
         session = answer.get("session")
         if answer.get("type") != "opened" or not isinstance(session, str):
             raise self._unexpected(answer)
+        try:
+            self._findings = tuple(Finding.from_json(each) for each in answer.get("findings", ()))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise self._unexpected(answer) from error
         self._session = session
         return connection
 

@@ -12,13 +12,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
-from db.records import Gel
+from db.records import Sensor
 from db.repositories import sensors
 from service.domain.context import Context
 from service.domain.errors import DomainError, KeyEnded, NoModel
 from service.domain.keys import check_not_ended
 from service.domain.principal import Principal
 from service.domain.recommended import AUTO
+from service.domain.reconstruct import described_by_another
 from service.domain.sensors import grasping
 from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
@@ -116,8 +117,10 @@ class _Connection:
         if isinstance(first, Open):
             await check_target(self._context, self._upload(first))
             address, model = self._principal.address or "", await self._known(first)
-            gel, materials = await self._gel(first), await self._candidates(first)
-            return await self._streams.open(first, self._principal.key_id, address, model, gel, materials), []
+            (gel, findings), materials = await self._gel(first), await self._candidates(first)
+            session = await self._streams.open(first, self._principal.key_id, address, model, gel, materials)
+            session.findings = findings
+            return session, []
         if isinstance(first, Resume):
             session = self._streams.find(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
@@ -146,19 +149,21 @@ class _Connection:
 
         return await self._context.threads.run(self._principal.share, read)
 
-    async def _gel(self, opening: Open) -> dict[str, float | None] | None:
-        """Of the sensor, if one is named and described."""
+    async def _gel(self, opening: Open) -> tuple[dict[str, float | None] | None, list[dict[str, Any]]]:
+        """Of the sensor, if one is named and described, with what is to be known of it."""
 
-        def find() -> Gel | None:
+        def find() -> Sensor | None:
             with self._context.database.read() as session:
-                found = sensors.find(session, opening.sensor)
-            return None if found is None else found.gel
+                return sensors.find(session, opening.sensor)
 
-        gel = None if opening.sensor == UNNAMED else await self._context.threads.run(self._principal.share, find)
-        return None if gel is None else asdict(gel)
+        found = None if opening.sensor == UNNAMED else await self._context.threads.run(self._principal.share, find)
+        if found is None or found.gel is None:
+            return None, []
+        findings = described_by_another(found.described_by, self._principal.key_id)
+        return asdict(found.gel), [asdict(finding) for finding in findings]
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
-        await self._send({"type": "opened", "session": session.id, "next": session.next})
+        await self._send({"type": "opened", "session": session.id, "next": session.next, "findings": session.findings})
         for answer in missed:
             await self._send(answer)
 
@@ -239,7 +244,7 @@ class _Connection:
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
         """Store the kept frames as an upload is stored; until the answer is there it may be said again."""
         if not message.store:
-            return {"type": "finished", "grasp_log": None}
+            return {"type": "finished", "grasp_log": None, "findings": session.findings}
         opening = session.opening
         if not opening.keep:
             raise End(REFUSED, "store needs keep, said when the session was opened")
@@ -249,7 +254,7 @@ class _Connection:
             stored = await self._context.store_threads.run(
                 share, self._store, spool, found, self._upload(opening), is_long=True
             )
-        return {"type": "finished", "grasp_log": stored}
+        return {"type": "finished", "grasp_log": stored, "findings": session.findings}
 
     def _upload(self, opening: Open) -> UploadRequest:
         return UploadRequest(opening.material, opening.sensor or None, opening.detector, principal=self._principal)

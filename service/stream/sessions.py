@@ -62,7 +62,8 @@ class RecentAnswers:
 class Session:
     """What the server knows of a session; the detector is in the worker.
 
-    ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for.
+    ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for; ``findings``: what its
+    client is to know of the sensor's gel.
     """
 
     id: str
@@ -70,6 +71,7 @@ class Session:
     key_id: str | None
     owner: str
     next: int = 0
+    findings: list[dict[str, Any]] = field(default_factory=list)
     recent: RecentAnswers = field(default_factory=RecentAnswers)
     connected: bool = False
     expiry: asyncio.TimerHandle | None = None

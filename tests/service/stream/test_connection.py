@@ -119,7 +119,7 @@ def test_json_is_for_trials_and_a_wrong_frame_is_answered_by_name(served: Served
         late = ask(socket, frame(ramp, 2, time=-1.0))
         assert (late["type"], late["name"]) == ("error", "time")
         assert ask(socket, frame(ramp, 3))["type"] == "state"
-        assert ask(socket, {"type": "finish"}) == {"type": "finished", "grasp_log": None}
+        assert ask(socket, {"type": "finish"}) == {"type": "finished", "grasp_log": None, "findings": []}
 
 
 def test_a_grip_controller_answers_and_begins_with_the_material_s_model(served: Served, ramp: GraspLog) -> None:
@@ -326,5 +326,29 @@ def test_a_stream_needs_a_key_that_may_upload(ramp: GraspLog, tmp_path: Path) ->
             stored = live.finish(store=True)
         assert stored is not None
         assert (stored["uploaded_by"], stored["job"]["requested_by"]) == (key_id, key_id)
+    finally:
+        served.stop()
+
+
+def test_a_stream_tells_whose_gel_it_is_by_which_forces_are_reconstructed(ramp: GraspLog, tmp_path: Path) -> None:
+    """Uploads had the finding, streams went by another's gel without a word."""
+    ids, texts = zip(*(keys.new_key() for _ in range(2)), strict=True)
+    with closing(Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}")) as database:
+        migrate.upgrade(database)
+        with database.write() as session:
+            for key_id, text in zip(ids, texts, strict=True):
+                access_keys.add(session, key_id, "robot", "upload", keys.digest(text))
+    served = Served(tmp_path, access="keys")
+    try:
+        with FrictionClient(served.url, texts[0]) as client:
+            client.describe_sensor("gel", 1e6, 0.5)
+        with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel", key=texts[0]) as own:
+            assert own.findings == ()
+        with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel", key=texts[1]) as live:
+            (told,) = live.findings
+        assert (told.name, ids[0] in told.evidence) == ("another's gel", True)
+        with served.connect({"Authorization": f"Bearer {texts[1]}"}) as socket:
+            answers = [ask(socket, each) for each in (opening(ramp, sensor="gel"), {"type": "finish"})]
+        assert [[each["name"] for each in answer["findings"]] for answer in answers] == [["another's gel"]] * 2
     finally:
         served.stop()

@@ -121,4 +121,4 @@ def test_who_stores_many_streams_leaves_room_for_what_is_quick(database: Databas
         return [socket.answers[-1] for socket in sockets]
 
     stored = asyncio.run(asyncio.wait_for(served(), 60.0))
-    assert stored == [{"type": "finished", "grasp_log": {"id": "a log"}}] * SHORT_AT_ONCE
+    assert stored == [{"type": "finished", "grasp_log": {"id": "a log"}, "findings": []}] * SHORT_AT_ONCE
