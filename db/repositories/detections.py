@@ -1,6 +1,6 @@
 """Queries on what was found in a log: detection and samples, stored together."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -61,7 +61,7 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     the earliest of several.
     """
     found = session.execute(_samples(material_id).order_by(GraspLogRow.number, GraspLogRow.id)).all()
-    copies = _copies(found)
+    copies = _copies(found, _alike(session, *_that_count(material_id)))
     copied = {each for others in copies.values() for each in others}
     counted = {row.sha256: row for row in found if row.sha256 not in copied}
     newest = {row.sha256: row.id for row in found}
@@ -138,7 +138,8 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
     newest = _samples(material_id).add_columns(GraspLogRow.grid_rows, GraspLogRow.grid_columns)
     newest = newest.order_by(*_NEWEST_FIRST).limit(most)  # as an index has them
     rows = session.execute(newest).all()
-    copied = {each for others in _copies(rows).values() for each in others}
+    copies = _copies(rows, _alike(session, GraspLogRow.id.in_([row.id for row in rows])))
+    copied = {each for others in copies.values() for each in others}
     found: dict[str, SampledLog] = {}
     for row in rows:
         if row.sha256 not in copied:
@@ -147,12 +148,23 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
     return list(found.values())
 
 
-def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+def _alike(session: Session, *of_logs: ColumnElement[bool]) -> Iterator[tuple[str, list[str]]]:
+    """Contents of logs with the fingerprints that each is alike, few at a time: each may have a thousand of them, which
+    of 4,000 copies of a grasp together took 700 MB.
+    """
+    query = select(GraspLogRow.sha256, DetectionRow.alike).select_from(GraspLogRow).join(SampleSummaryRow)
+    query = query.join(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
+    query = query.where(*of_logs, DetectionRow.fingerprint.is_not(None), DetectionRow.alike.is_not(None))
+    for sha256, alike in session.execute(query.execution_options(yield_per=10)):
+        yield sha256, alike or []
+
+
+def _copies(rows: Sequence[Row[Any]], alike: Iterable[tuple[str, list[str]]]) -> dict[str, list[str]]:
     """Contents of the same grasp as another that has more samples, or as many and was sent earlier; by the content of
     that one.
 
     A content may have several fingerprints, by several detectors or from merged materials: they are of one grasp. So
-    are those that it is alike while it is among the rows: two grasps that one recording holds are two without it.
+    are those that it is ``alike`` while it is among the rows: two grasps that one recording holds are two without it.
     """
     counts: dict[str, int] = {}  # of each content, as it was sent last
     marks: dict[str, str] = {}  # the first fingerprint of each, in the order in which they were sent
@@ -165,15 +177,20 @@ def _copies(rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
             mark = joined[mark]
         return mark
 
-    for row in sorted(rows, key=lambda row: (row.number, row.id)):
-        counts[row.sha256] = row.samples
-        if row.fingerprint is None:
-            continue
-        of_content = grasp(marks.setdefault(row.sha256, row.fingerprint))
-        for mark in there.intersection([row.fingerprint, *(row.alike or ())]):
+    def join(content: str, others: Iterable[str]) -> None:
+        of_content = grasp(marks[content])
+        for mark in others:
             if (other := grasp(mark)) != of_content:
                 joined[of_content] = other  # to which most of the others are joined
                 of_content = other
+
+    for row in sorted(rows, key=lambda row: (row.number, row.id)):
+        counts[row.sha256] = row.samples
+        if row.fingerprint is not None:
+            marks.setdefault(row.sha256, row.fingerprint)
+            join(row.sha256, [row.fingerprint])
+    for content, others in alike:
+        join(content, there.intersection(others))
     groups: dict[str, list[str]] = {}
     for content, mark in marks.items():
         groups.setdefault(grasp(mark), []).append(content)
@@ -197,7 +214,6 @@ _WHAT = (
     SampleSummaryRow.moments,
     DetectionRow.findings,
     DetectionRow.fingerprint,
-    DetectionRow.alike,
 )
 
 

@@ -1,3 +1,4 @@
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -355,3 +356,31 @@ def test_the_blobs_that_rows_refer_to_are_known(
     with database.read() as session:
         assert blobs.referenced(session, [*used, "0" * 64]) == used
         assert blobs.referenced(session, []) == set()
+
+
+def test_what_copies_of_a_grasp_are_alike_is_not_held_together(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    """4,000 copies, each with a thousand fingerprints of others, took 700 MB of whoever fitted their material."""
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+    marks = [f"{number:064x}" for number in range(60)]
+    with database.write() as session:
+        for number, mark in enumerate(marks):
+            log_id = grasp_logs.add(session, new_log(paper))
+            jobs.add(session, "ingest", "ols", material_id=paper, grasp_log_id=log_id)
+            alike = [*marks[:number], *(f"{number}{gone:059x}" for gone in range(1000 - number))]
+            detections.add(session, log_id, replace(detection, fingerprint=mark), samples, alike=alike)
+    with database.read() as session:
+        tracemalloc.start()
+        try:
+            counted = (
+                detections.samples_of_material(session, paper),
+                detections.newest_sampled_logs(session, paper, 60),
+            )
+            _, most = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+    assert [len(found) for found in counted] == [1, 1]
+    assert len(counted[0][0].copies) == len(marks) - 1
+    assert most < 4e6  # it was 7 MB
