@@ -60,9 +60,11 @@ def as_found(session: Session, name: str) -> str:
 
 
 def check_spelling(session: Session, name: str) -> None:
-    """Raises ``InvalidValue`` for a new name with spaces at its ends: two sensors would seem to have one."""
+    """Raises ``InvalidValue`` for a new name with spaces at its ends or what cannot be printed: two would seem one."""
     if as_found(session, name) != name:
         raise InvalidValue("sensor", repr(name), "a name without spaces at its ends")
+    if not name.isprintable() and sensors.find(session, name) is None:
+        raise InvalidValue("sensor", repr(name), "printable characters, as uploads have them")
 
 
 def check_name(name: str) -> None:

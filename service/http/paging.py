@@ -12,6 +12,7 @@ from urllib.parse import quote
 from fastapi import Request, Response
 
 from db.paging import Window
+from db.text import is_storable
 from service.http.problems import INVALID_REQUEST, Problem
 
 LARGEST_ID = 2**31 - 1
@@ -28,8 +29,8 @@ def _moment(value: Any) -> datetime:
 
 
 def _text(value: Any) -> str:
-    if not isinstance(value, str) or not value.isprintable():
-        raise TypeError("no printable text")
+    if not isinstance(value, str) or not is_storable(value):
+        raise TypeError("no text that is stored")
     return value
 
 

@@ -81,6 +81,8 @@ def test_a_key_describes_as_many_sensors_a_day_as_it_may(context: Context) -> No
         ("left/calibrations/1", "allowed: a name without /calibrations"),
         (" left", "sensor is ' left'; allowed: a name without spaces at its ends"),
         ("left\t", "allowed: a name without spaces at its ends"),
+        ("le\u200bft", "allowed: printable characters, as uploads have them"),
+        ("\u202etfel", "allowed: printable characters"),
     ],
 )
 def test_a_name_is_that_of_one_sensor(context: Context, name: str, told: str) -> None:
@@ -101,6 +103,12 @@ def test_spaces_at_the_ends_are_kept_where_a_sensor_is_stored_so(database: Datab
         stored.describe(session, " left ", GEL)
         assert sensors.as_found(session, " left ") == " left "
         sensors.check_spelling(session, " left ")
+
+
+def test_a_name_that_an_earlier_version_took_may_be_described_anew(database: Database) -> None:
+    with database.write() as session:
+        stored.hold(session, "le\x7fft")
+        sensors.check_spelling(session, "le\x7fft")
 
 
 @pytest.mark.usefixtures("context")
