@@ -47,6 +47,11 @@ def find_ids(session: Session, names: Sequence[str]) -> dict[str, int]:
     return {name: found[name] for name in names}
 
 
+def own_name(session: Session, material_id: int) -> str:
+    """The name that is a material's own, whatever others it is found by."""
+    return session.scalars(select(MaterialRow.name).where(MaterialRow.id == material_id)).one()
+
+
 def get(session: Session, name: str) -> Material:
     """One material, by its name or an alias, with its current models; raises ``NotFound``."""
     return _with_counts_and_models(session, [find_id(session, name)])[0]

@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from db.records import AuditAction
-from db.repositories import audit
+from db.repositories import audit, materials
 from service.domain.keys import check_not_ended
 from service.domain.principal import Principal
 
@@ -20,3 +20,14 @@ def record(
     """
     check_not_ended(session, principal.key_id)
     audit.add(session, principal.actor, action, subject, details)
+
+
+def record_of_material(
+    session: Session,
+    principal: Principal,
+    action: AuditAction,
+    material_id: int,
+    details: Mapping[str, Any] | None = None,
+) -> None:
+    """Record a change of a material under its own name: who looks for that finds what was done by an alias, too."""
+    record(session, principal, action, materials.own_name(session, material_id), details)

@@ -8,7 +8,7 @@ from db.errors import NotFound
 from db.records import Job, Material, StoredGraspLog
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, owners
 from service.domain import quotas
-from service.domain.changes import record
+from service.domain.changes import record, record_of_material
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
@@ -61,7 +61,7 @@ def change(
         description = None if description == before.description else description
         if (name, description) != (None, None):
             quotas.check_change(session, context.settings, principal.key_id)
-            record(session, principal, "material.changed", material, {"name": name, "description": description})
+            record(session, principal, "material.changed", before.name, {"name": name, "description": description})
         if description is not None:
             materials.describe(session, material_id, description)
         if name is not None:
@@ -81,15 +81,16 @@ def add_alias(context: Context, material: str, alias: str, principal: Principal 
         changed = materials.get(session, material)
         if is_new:
             _check_aliases(changed)
-            record(session, principal, "alias.added", material, {"alias": alias})
+            record(session, principal, "alias.added", changed.name, {"alias": alias})
     return changed
 
 
 def remove_alias(context: Context, material: str, alias: str, principal: Principal = ANONYMOUS) -> None:
     """Free an alias; raises as ``change``."""
     with context.database.write() as session:
-        materials.remove_alias(session, _changeable(session, material, principal), alias)
-        record(session, principal, "alias.removed", material, {"alias": alias})
+        material_id = _changeable(session, material, principal)
+        materials.remove_alias(session, material_id, alias)
+        record_of_material(session, principal, "alias.removed", material_id, {"alias": alias})
     context.models.seen()
 
 
@@ -102,8 +103,9 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
         if target_id == source_id:
             raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
+        told = {"source": materials.own_name(session, source_id)}
         materials.merge(session, target_id, source_id)
-        record(session, principal, "material.merged", material, {"source": source})
+        record_of_material(session, principal, "material.merged", target_id, told)
         queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
         _check_aliases(merged)
@@ -127,7 +129,7 @@ def begin_epoch(
             raise InvalidValue("first_grasp_log", first_log, f"a log of {material}, or null") from error
         if withdrawn:
             told = {"reason": because, "first_grasp_log": first_log, "withdrawn": len(withdrawn)}
-            record(session, principal, "material.epoch_begun", materials.get(session, material).name, told)
+            record_of_material(session, principal, "material.epoch_begun", material_id, told)
         queued = _refit_without(session, material_id, principal.key_id) if withdrawn else []
         found = materials.get(session, material)
     return found, len(withdrawn), _follow_up(context, queued)

@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 from db.records import Job
 from db.repositories import jobs, materials
 from service.domain import quotas
-from service.domain.changes import record
+from service.domain.changes import record_of_material
 from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import queue
@@ -25,5 +25,6 @@ def request_fit(
     quotas.check_job(session, settings, principal.key_id)
     quotas.check_change(session, settings, principal.key_id)
     job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
-    record(session, principal, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
+    told = {"job": job_id, "method": method, "seed": seed}
+    record_of_material(session, principal, "fit.requested", material_id, told)
     return jobs.get(session, job_id)

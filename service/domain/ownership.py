@@ -5,7 +5,7 @@ from sqlalchemy.orm import Session
 from db.errors import NotFound
 from db.repositories import access_keys, materials, owners
 from service.domain import quotas
-from service.domain.changes import record
+from service.domain.changes import record_of_material
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
 from service.domain.principal import Principal
@@ -52,7 +52,7 @@ def add_owner(context: Context, material: str, owner: str, principal: Principal)
         if owners.add(session, material_id, owner):
             if len(known) >= MOST_OWNERS:
                 raise InvalidValue("owners", len(known) + 1, f"at most {MOST_OWNERS} of a material")
-            record(session, principal, "owner.added", material, {"owner": owner})
+            record_of_material(session, principal, "owner.added", material_id, {"owner": owner})
         return owners.of_material(session, material_id)
 
 
@@ -66,7 +66,7 @@ def remove_owner(context: Context, material: str, owner: str, principal: Princip
         check_may_change(session, material_id, principal)
         if not owners.remove(session, material_id, owner):
             raise UnknownOwner("owner", owner, f"an owner of {material}")
-        record(session, principal, "owner.removed", material, {"owner": owner})
+        record_of_material(session, principal, "owner.removed", material_id, {"owner": owner})
 
 
 def _check(principal: Principal, found: list[str]) -> None:

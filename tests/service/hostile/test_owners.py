@@ -210,3 +210,37 @@ def test_where_no_key_is_asked_for_nobody_owns_anything(reach: Callable[..., Any
     assert local.get("/v1/materials/paper/owners").json() == {"owners": []}
     assert local.request("PATCH", "/v1/materials/paper", json={"name": "card"}).status_code == OK
     assert {entry["actor"] for entry in local.get("/v1/audit").json()["items"]} == {"anybody"}
+
+
+def test_the_trail_names_a_material_by_its_own_name_whatever_alias_was_used(lab: Lab) -> None:
+    """Whoever looked for what was done to a material missed what was done by an alias, which may be gone since."""
+    by_alias = "/v1/materials/A4"
+    lab.maker.request("PUT", "/v1/materials/paper/aliases/A4")
+    lab.maker.request("POST", "/v1/materials", json={"name": "papre"})
+    lab.maker.request("PUT", "/v1/materials/papre/aliases/typo")
+    for method, path, body in (
+        ("PATCH", by_alias, {"description": "white"}),
+        ("PUT", f"{by_alias}/aliases/sheet", None),
+        ("DELETE", f"{by_alias}/aliases/sheet", None),
+        ("PUT", f"{by_alias}/owners/group:guests", None),
+        ("DELETE", f"{by_alias}/owners/group:guests", None),
+        ("POST", f"{by_alias}/fits", {"method": "ols"}),
+        ("POST", f"{by_alias}/merges", {"source": "typo"}),
+        ("POST", f"{by_alias}/epochs", {"reason": "new lot"}),
+    ):
+        assert lab.maker.request(method, path, json=body).is_success, path
+    entries = lab.admin.get("/v1/audit", params={"subject": "paper"}).json()["items"][::-1]
+    assert [entry["action"] for entry in entries] == [
+        "material.created",
+        "alias.added",
+        "material.changed",
+        "alias.added",
+        "alias.removed",
+        "owner.added",
+        "owner.removed",
+        "fit.requested",
+        "material.merged",
+        "material.epoch_begun",
+    ]
+    assert entries[-2]["details"] == {"source": "papre"}
+    assert lab.admin.get("/v1/audit", params={"subject": "A4"}).json()["items"] == []
