@@ -26,7 +26,7 @@ from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
 from service.json_objects import RepeatedKey
 from service.stream import detectors
-from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
+from service.stream.errors import FINISHED, IN_USE, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
     UNNAMED,
     Finish,
@@ -107,8 +107,7 @@ class _Connection:
         session, missed = await self._begin(first)
         self._streams.join(session)
         try:
-            await self._greet(session, missed)
-            await self._carry(session)
+            await until_one_ends(self._talk(session, missed), self._let_go(session))
         finally:
             self._streams.leave(session)
 
@@ -122,7 +121,7 @@ class _Connection:
             session.findings = findings
             return session, []
         if isinstance(first, Resume):
-            session = self._streams.find(first.session, self._principal.key_id)
+            session = await self._streams.take_over(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
         raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
 
@@ -161,6 +160,15 @@ class _Connection:
             return None, []
         findings = described_by_another(found.described_by, self._principal.key_id)
         return asdict(found.gel), [asdict(finding) for finding in findings]
+
+    async def _talk(self, session: Session, missed: list[dict[str, Any]]) -> None:
+        await self._greet(session, missed)
+        await self._carry(session)
+
+    async def _let_go(self, session: Session) -> None:
+        """End once another connection is to go on with the session."""
+        await session.wanted.wait()
+        raise End(IN_USE, "the session goes on in another connection")
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
         await self._send({"type": "opened", "session": session.id, "next": session.next, "findings": session.findings})

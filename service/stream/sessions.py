@@ -29,6 +29,9 @@ RECONNECT_SECONDS = 60.0
 FRAMES_AT_ONCE, FRAMES_OF_ONE = 4, 2
 """With the detectors' process, which does one after the other: one is done while the next one of an owner is sent."""
 
+TAKE_OVER_SECONDS = 5.0
+"""s that the connection before may take to let go of a session with which another one goes on."""
+
 LEAST_PAUSE, MOST_PAUSE = 0.005, 0.1
 """s until a frame that came too fast is tried again."""
 
@@ -63,7 +66,7 @@ class Session:
     """What the server knows of a session; the detector is in the worker.
 
     ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for; ``findings``: what its
-    client is to know of the sensor's gel.
+    client is to know of the sensor's gel; ``wanted``: another connection is to go on with it, ``free``: none does.
     """
 
     id: str
@@ -74,6 +77,8 @@ class Session:
     findings: list[dict[str, Any]] = field(default_factory=list)
     recent: RecentAnswers = field(default_factory=RecentAnswers)
     connected: bool = False
+    wanted: asyncio.Event = field(default_factory=asyncio.Event)
+    free: asyncio.Event = field(default_factory=asyncio.Event)
     expiry: asyncio.TimerHandle | None = None
     begun_at: datetime = field(default_factory=lambda: datetime.now(UTC))
     broadcast: Broadcast = field(default_factory=Broadcast)
@@ -135,20 +140,35 @@ class Streams:
     def join(self, session: Session) -> None:
         """A connection carries the session from now on."""
         session.connected = True
+        session.wanted.clear()
+        session.free.clear()
         if session.expiry is not None:
             session.expiry.cancel()
 
     def leave(self, session: Session) -> None:
         """No connection does; the session is forgotten unless there is one in time."""
         session.connected = False
+        session.free.set()
         if session.id in self._sessions:
             session.expiry = asyncio.get_running_loop().call_later(RECONNECT_SECONDS, self._forget, session)
 
     def find(self, name: str, key_id: str | None) -> Session:
-        """The session to go on with, of the same key; raises ``End``."""
+        """The session of this name and key, with or without a connection; raises ``End``."""
         session = self._sessions.get(name)
         if session is None or session.key_id != key_id:
             raise End(UNKNOWN_SESSION, "no such session, or it waited too long")
+        return session
+
+    async def take_over(self, name: str, key_id: str | None) -> Session:
+        """The session to go on with, of the same key, from the connection that has it: a client whose network changed
+        comes back long before the end of that is noticed. Raises ``End``.
+        """
+        session = self.find(name, key_id)
+        if session.connected:
+            session.wanted.set()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(session.free.wait(), TAKE_OVER_SECONDS)
+            session = self.find(name, key_id)
         if session.connected:
             raise End(IN_USE, "the session has a connection already")
         return session

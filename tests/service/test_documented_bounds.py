@@ -134,7 +134,8 @@ STATED = {
                 f"{sockets.KEY_SECONDS:g} s",
                 ends.UNKNOWN_SESSION: "no such session",
                 ends.SLOW_READER: "answers wait to be read, too many",
-                ends.IN_USE: "the session has a connection already",
+                ends.IN_USE: "the session has a connection already, which did not let go of it within "
+                f"{sessions.TAKE_OVER_SECONDS:g} s",
                 ends.REFUSED: "what was asked cannot be",
                 ends.TOO_MANY: f"{sessions.MOST_SESSIONS} sessions are open",
                 ends.STORAGE_AWAY: "database or disk cannot be used now",

@@ -4,15 +4,16 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx
-import msgspec
 import numpy as np
 import pytest
 import uvicorn
@@ -290,11 +291,61 @@ def test_a_session_is_told_that_its_detector_is_lost(served: Served, ramp: Grasp
 
 
 def test_a_session_belongs_to_one_connection_at_a_time(served: Served, ramp: GraspLog) -> None:
+    """The one that came last: a client whose network changed comes back before the end of the first is noticed."""
+    history, slip = detect_slip(replace(ramp, object_pose=None, normal=None)), []
     with served.connect() as first, served.connect() as second:
         session = ask(first, opening(ramp))["session"]
-        second.send(msgspec.json.encode({"type": "resume", "session": session}).decode())
-        with pytest.raises(ConnectionClosed, match="has a connection already"):
-            second.recv(30.0)
+        slip += [ask(first, frame(ramp, k))["slip"] for k in range(30)]
+        first.send(json.dumps(frame(ramp, 30)))
+        goes_on = ask(second, {"type": "resume", "session": session, "last": 29})
+        assert goes_on["type"] == "opened"
+        with pytest.raises(ConnectionClosed, match="goes on in another connection") as closed:
+            [first.recv(30.0) for _ in range(2)]
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4409
+        answers = [] if goes_on["next"] == 30 else [json.loads(second.recv(30.0))]
+        answers += [ask(second, frame(ramp, k)) for k in range(goes_on["next"], len(ramp))]
+        assert [answer["number"] for answer in answers] == list(range(30, len(ramp)))
+    slip += [answer["slip"] for answer in answers]
+    assert slip == [np.flatnonzero(each).tolist() for each in history.slip]
+
+
+class Relay:
+    """Passes connections on to a server, and lets its end of each live for as long as the relay itself."""
+
+    def __init__(self, port: int) -> None:
+        self._port, self.ends = port, list[socket.socket]()
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                near, far = self._listening.accept()[0], socket.create_connection(("127.0.0.1", self._port))
+                self.ends += [near, far]
+                for each, other in ((near, far), (far, near)):
+                    threading.Thread(target=self._pass_on, args=(each, other), daemon=True).start()
+
+    def _pass_on(self, near: socket.socket, far: socket.socket) -> None:
+        with suppress(OSError):
+            while content := near.recv(65536):
+                far.sendall(content)
+
+    def close(self) -> None:
+        for each in (self._listening, *self.ends):
+            each.close()
+
+
+def test_a_stream_goes_on_whose_old_connection_nobody_saw_end(served: Served, ramp: GraspLog) -> None:
+    """As of a robot that came to another network: for the service the first one lives for up to 40 s more."""
+    with closing(Relay(int(served.url.rpartition(":")[2]))) as relay:
+        live = SlipStream(f"http://127.0.0.1:{relay.port}", ramp.position, ramp.element_area)
+        live.step(ramp.time[0], *parts(ramp, 0))
+        live._url = served.url.replace("http", "ws") + "/v1/stream"
+        relay.ends[0].shutdown(socket.SHUT_RDWR)
+        assert [live.step(ramp.time[k], *parts(ramp, k))["number"] for k in range(1, 5)] == [1, 2, 3, 4]
+        live.finish()
 
 
 def test_a_service_that_is_not_there_is_named(ramp: GraspLog) -> None:

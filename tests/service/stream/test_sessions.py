@@ -87,22 +87,53 @@ def test_a_sensor_that_cannot_be_leaves_no_session() -> None:
     run(steps())
 
 
-def test_a_session_is_gone_on_with_by_its_own_key_and_one_connection() -> None:
+def test_a_session_is_gone_on_with_by_its_own_key() -> None:
     async def steps() -> None:
         streams = Here()
         session = await streams.begin("a")
-        assert streams.find(session.id, "a") is session
+        assert await streams.take_over(session.id, "a") is session
         for name, key in ((session.id, "b"), (session.id, None), ("none", "a")):
+            streams.join(session)
             with pytest.raises(End, match="no such session, or it waited too long") as ended:
-                streams.find(name, key)
+                await streams.take_over(name, key)
             assert ended.value.code == UNKNOWN_SESSION
-        streams.join(session)
-        with pytest.raises(End, match="the session has a connection already") as ended:
-            streams.find(session.id, "a")
-        assert ended.value.code == IN_USE
-        streams.leave(session)
-        assert streams.find(session.id, "a") is session
+            assert not session.wanted.is_set()
+            streams.leave(session)
         assert streams.get(session.id) is session
+
+    run(steps())
+
+
+def test_a_session_is_let_go_by_one_connection_for_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a client whose network changed the first is dead long before its end is noticed."""
+    monkeypatch.setattr(sessions, "TAKE_OVER_SECONDS", 0.05)
+
+    async def steps() -> None:
+        streams = Here()
+        session = await streams.begin("a")
+        streams.join(session)
+        with pytest.raises(End, match="the session has a connection already") as ended:  # which does not let go
+            await streams.take_over(session.id, "a")
+        assert ended.value.code == IN_USE
+
+        async def let_go() -> None:
+            await session.wanted.wait()
+            streams.leave(session)
+
+        _, *taken = await asyncio.gather(let_go(), streams.take_over(session.id, "a"))
+        assert taken == [session]
+        streams.join(session)
+        assert (session.connected, session.wanted.is_set(), session.free.is_set()) == (True, False, False)
+
+        async def end() -> None:
+            await session.wanted.wait()
+            await streams.end(session)
+            streams.leave(session)
+
+        ending = asyncio.create_task(end())
+        with pytest.raises(End, match="no such session"):  # it has ended meanwhile
+            await streams.take_over(session.id, "a")
+        await ending
 
     run(steps())
 
