@@ -52,6 +52,11 @@ def keep(session: Session, owner: str, key: str, answer: Mapping[str, Any]) -> N
     session.execute(update(IdempotencyKeyRow).where(*of_it).values(answer=dict(answer)))
 
 
+def release(session: Session, owner: str, key: str) -> None:
+    """Give a key back that this transaction has claimed."""
+    session.execute(delete(IdempotencyKeyRow).where(IdempotencyKeyRow.owner == owner, IdempotencyKeyRow.key == key))
+
+
 def _forget(session: Session, lifetime: timedelta) -> None:
     """Remove some old keys, none that another transaction is about: two must not wait for each other."""
     columns = (IdempotencyKeyRow.owner, IdempotencyKeyRow.key)

@@ -18,6 +18,9 @@ from service.http.problems import IDEMPOTENCY_KEY_REUSED, INVALID_REQUEST, Probl
 
 LONGEST_KEY = 200
 
+THERE_ALREADY = 200
+"""Status of an upload that stores nothing."""
+
 KeyHeader = Annotated[
     str | None,
     Header(
@@ -80,7 +83,8 @@ def respond_once(
 ) -> RepeatableResponse:
     """The response that ``make`` gives in this transaction, or the one that it gave under the same key.
 
-    Raises ``Problem`` for a key under which something else was asked.
+    Of what was there already nothing is kept, so that no key stores more by asking for that. Raises ``Problem`` for a
+    key under which something else was asked.
     """
     if key is None:
         return make()
@@ -91,7 +95,10 @@ def respond_once(
     if earlier is not None:
         return RepeatableResponse(**earlier)
     response = make()
-    idempotency_keys.keep(session, key.owner, key.text, asdict(response))
+    if response.status == THERE_ALREADY:
+        idempotency_keys.release(session, key.owner, key.text)
+    else:
+        idempotency_keys.keep(session, key.owner, key.text, asdict(response))
     return response
 
 

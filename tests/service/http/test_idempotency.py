@@ -97,6 +97,19 @@ def test_what_was_refused_may_be_mended_under_its_key(client: Any, database: Dat
     assert send(client, "/v1/materials", json={"name": "paper"}).status_code == 201
 
 
+def test_an_upload_of_what_is_stored_already_keeps_nothing(client: Any, database: Database, content: bytes) -> None:
+    """Each kept its answer for a day: 4 GB of them, which no quota counted, by one small log sent again and again."""
+    upload = {"content": content, "headers": NPZ}
+    first = send(client, "/v1/grasp-logs", "a", **upload)
+    for _ in range(2):
+        again = send(client, "/v1/grasp-logs", "b", **upload)
+        assert (again.status_code, again.json()["id"]) == (200, first.json()["id"])
+    assert (send(client, "/v1/grasp-logs", "a", **upload).content, count(database, IdempotencyKeyRow)) == (
+        first.content,
+        1,
+    )
+
+
 @pytest.mark.parametrize("key", ["", " ", "a b", "x" * 201, "ü".encode()])
 def test_a_key_that_cannot_be_is_refused_by_name(client: Any, key: Any) -> None:
     answer = send(client, "/v1/materials", key, json={"name": "paper"})
