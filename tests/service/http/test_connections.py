@@ -518,3 +518,139 @@ def test_what_is_held_back_behind_an_early_answer_pauses_reading(connect: Connec
             while sent < 2**26:
                 sent += connection.send(block)
     assert sent < 2**25
+
+
+def scope_of(*headers: tuple[bytes, bytes], version: str = "1.1", path: bytes = b"/a", query: bytes = b"") -> Scope:
+    return {"http_version": version, "raw_path": path, "path": "/a", "query_string": query, "headers": [*headers]}
+
+
+HOST, LENGTH, CHUNKED = (b"host", b"a"), (b"content-length", b"1"), (b"transfer-encoding", b"Chunked")
+
+
+@pytest.mark.parametrize(
+    "scope",
+    [
+        scope_of(HOST),
+        scope_of(version="1.0"),
+        scope_of(HOST, version="1.0"),
+        scope_of(HOST, path=b"*"),
+        scope_of(HOST, LENGTH),
+        scope_of(HOST, CHUNKED),
+    ],
+)
+def test_what_every_parser_reads_alike_is_taken(scope: Scope) -> None:
+    assert connections.ambiguity(scope) is None
+
+
+@pytest.mark.parametrize(
+    ("scope", "fault"),
+    [
+        (scope_of(HOST, version="2.0"), "HTTP version 2.0; allowed: 1.0, 1.1"),
+        (scope_of(HOST, path=b"a"), "a target other than a path"),
+        (scope_of(HOST, path=b"**"), "a target other than a path"),
+        (scope_of(HOST, path=b"/a#b"), "a target other than a path"),
+        (scope_of(), "0 headers Host; allowed: 1"),
+        (scope_of(HOST, HOST), "2 headers Host; allowed: 1"),
+        (scope_of(HOST, HOST, version="1.0"), "2 headers Host; allowed: 1"),
+        (scope_of(HOST, LENGTH, CHUNKED), "both Transfer-Encoding and Content-Length; allowed: one of them"),
+        (scope_of(HOST, CHUNKED, CHUNKED), "a Transfer-Encoding other than chunked; allowed: chunked"),
+        (scope_of(HOST, (b"transfer-encoding", b"gzip")), "a Transfer-Encoding other than chunked; allowed: chunked"),
+    ],
+)
+def test_what_two_parsers_could_read_differently_is_named(scope: Scope, fault: str) -> None:
+    told = connections.ambiguity(scope)
+    assert told is not None
+    assert told.startswith(fault)
+
+
+def refused(scope: Scope, *, is_beyond: bool = False, has_room: bool = True) -> tuple[str, str] | None:
+    connection: Any = SimpleNamespace(_is_beyond=is_beyond, _has_room=lambda: has_room)
+    refusal = BoundedConnection._refusal(connection, scope)
+    return None if refusal is None else (refusal[0].title, refusal[1])
+
+
+def test_a_request_has_as_many_headers_and_parameters_as_it_may_and_none_more() -> None:
+    assert refused(scope_of(*[HOST, *99 * [(b"a", b"b")]])) is None
+    told = refused(scope_of(*[HOST, *100 * [(b"a", b"b")]]))
+    assert told is not None
+    assert told[1] == "101 headers; allowed: at most 100"
+    assert refused(scope_of(HOST, query=b"a=1" + 99 * b"&a")) is None
+    told = refused(scope_of(HOST, query=b"a=1" + 100 * b"&a"))
+    assert told is not None
+    assert told[1] == "101 parameters; allowed: at most 100"
+
+
+@pytest.mark.parametrize("name", [b"connection", b"upgrade", b"http2-settings", b"sec-websocket-protocol"])
+def test_an_offer_of_another_protocol_is_as_long_as_it_may_be_and_no_longer(name: bytes) -> None:
+    rest_of_it = (b"sec-websocket-key", 24 * b"k")
+    assert refused(scope_of(HOST, rest_of_it, (name, 1000 * b"a"), (b"cookie", 2000 * b"c"))) is None
+    told = refused(scope_of(HOST, rest_of_it, (name, 1001 * b"a")))
+    assert told is not None
+    assert told[1] == "headers for another protocol of 1025 bytes; allowed: at most 1024"
+
+
+def test_where_there_is_no_room_nothing_else_is_looked_at() -> None:
+    beyond, full = refused(scope_of(), is_beyond=True), refused(scope_of(), has_room=False)
+    assert beyond is not None
+    assert full is not None
+    assert beyond[1] == "this address has as many as it may; try again later"
+    assert full[1] == "as many connections are open as may be; try again later"
+
+
+def test_who_is_told_to_try_again_is_told_at_once_and_when() -> None:
+    for kind, seconds in ((connections.TOO_MANY_CONNECTIONS, 0.0), (connections.BAD_REQUEST, 0.5)):
+        content = connections._problem(kind, "why", "/a")
+        headers = dict(connections._headers(kind, content))
+        assert connections._seconds_until(kind) == seconds
+        assert headers.get(b"retry-after") == (b"1" if seconds == 0.0 else None)
+        assert (headers[b"connection"], headers[b"content-length"]) == (b"close", b"%d" % len(content))
+        assert headers[b"content-type"] == b"application/problem+json"
+        told = json.loads(content)
+        assert (told["status"], told["detail"], told["instance"]) == (kind.status, "why", "/a")
+        assert (told["type"], told["title"]) == (kind.uri, kind.title)
+
+
+def test_a_websocket_is_asked_for_without_a_body_and_by_http_1_1() -> None:
+    assert connections._fault_of_handshake(scope_of(HOST)) is None
+    for scope, fault in (
+        (scope_of(HOST, version="1.0"), "a WebSocket is asked for by HTTP 1.0; allowed: 1.1"),
+        (scope_of(HOST, LENGTH), "a WebSocket is asked for with a body; allowed: none"),
+        (scope_of(HOST, CHUNKED), "a WebSocket is asked for with a body; allowed: none"),
+    ):
+        told = connections._fault_of_handshake(scope)
+        assert told is not None
+        assert told[1] == fault
+
+
+@pytest.mark.parametrize(
+    ("open_ones", "let_go", "tasks", "has_room"),
+    [(5, 0, 5, True), (6, 0, 5, False), (6, 1, 5, True), (6, 2, 6, False), (0, 0, 6, False)],
+)
+def test_as_many_connections_and_requests_may_be_as_are_allowed(
+    open_ones: int, let_go: int, tasks: int, has_room: bool
+) -> None:
+    """Those that were let go are among the connections until the loop's next round, and take no room."""
+    known = {Mock(is_let_go=k < let_go) for k in range(open_ones)}
+    connection: Any = SimpleNamespace(_most=5, connections=known, tasks=set(range(tasks)))
+    connection._staying = lambda: BoundedConnection._staying(connection)
+    assert BoundedConnection._has_room(connection) is has_room
+    connection._most = None
+    assert BoundedConnection._has_room(connection)
+
+
+def test_first_goes_who_closes_unread_and_then_the_longest_idle() -> None:
+    def held(idle_since: float, *, is_closing: bool) -> Any:
+        return Mock(idle_since=idle_since, transport=Mock(**{"is_closing.return_value": is_closing}))
+
+    long_idle, idle, closing = held(1.0, is_closing=False), held(2.0, is_closing=False), held(3.0, is_closing=True)
+    assert sorted([idle, long_idle, closing], key=connections._need) == [closing, long_idle, idle]
+
+
+@pytest.mark.parametrize("unsent", [0, 1])
+def test_who_has_not_read_all_is_let_go_at_once(unsent: int) -> None:
+    one = Mock(is_let_go=False, transport=Mock(**{"get_write_buffer_size.return_value": unsent}))
+    connections._let_go(one)
+    assert one.is_let_go
+    assert (one.transport.abort.call_count, one.transport.close.call_count) == (unsent, 1 - unsent)
+    BoundedConnection._give_up(SimpleNamespace(transport=one.transport))  # type: ignore[arg-type]
+    assert one.transport.abort.call_count == 2 * unsent
