@@ -1,9 +1,11 @@
+import asyncio
 import gzip
 import inspect
 import json
 import math
 import zlib
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -938,3 +940,125 @@ def test_a_packed_answer_without_its_end_is_a_broken_connection(
     with pytest.raises(ConnectionFailed, match=told):
         ask(answer, "material", "paper")
     assert len(asked) == 3
+
+
+def refused_question(client: Any, name: str, *given: Any, timeout: float = 30.0) -> httpx.Request:
+    """What a call asks first."""
+    asked: list[httpx.Request] = []
+
+    def refuse(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        return problem()
+
+    async def ask_and_wait() -> None:
+        async with client("http://stiction", transport=httpx.MockTransport(refuse), timeout=timeout) as asking:
+            await getattr(asking, name)(*given)
+
+    with suppress(ProblemError):
+        if client is AsyncFrictionClient:
+            asyncio.run(ask_and_wait())
+        else:
+            with client("http://stiction", transport=httpx.MockTransport(refuse), timeout=timeout) as asking:
+                getattr(asking, name)(*given)
+    return asked[0]
+
+
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+@pytest.mark.parametrize(
+    ("name", "given", "told"),
+    [
+        ("grasp_logs", (), {"limit": "100"}),
+        ("grasp_logs", ("paper", 7), {"material": "paper", "limit": "7"}),
+        ("jobs", (), {"limit": "100"}),
+        ("audit", (), {"limit": "100"}),
+        ("audit", ("key:1", "made", "paper"), {"limit": "100", "actor": "key:1", "action": "made", "subject": "paper"}),
+        ("friction", ("paper", 1e-3, 0.05), {"v": "0.001", "fn": "0.05"}),
+        (
+            "next_grasp",
+            ("paper",),
+            {"v": "0.0", "quantile": "0.01", "elements": "60", "load": "0.0", "drop_probability": "0.001"},
+        ),
+        ("wait", ("1f",), {"wait": "2.0"}),
+    ],
+)
+def test_what_is_not_given_is_asked_for_as_the_call_says(
+    client: Any, name: str, given: tuple[Any, ...], told: dict[str, str]
+) -> None:
+    assert dict(refused_question(client, name, *given).url.params) == told
+
+
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+@pytest.mark.parametrize(
+    ("name", "given", "told"),
+    [
+        ("fit", ("paper",), {"method": "auto", "seed": 0}),
+        ("create_material", ("paper",), {"name": "paper", "description": ""}),
+        ("ensure_material", ("paper",), {"name": "paper", "description": ""}),
+        ("begin_epoch", ("paper", "new"), {"reason": "new", "first_grasp_log": None}),
+        ("recognise", ("1f",), {"grasp_log": "1f", "materials": None}),
+        (
+            "describe_sensor",
+            ("left", 2e5, 0.48),
+            {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 0.0},
+        ),
+    ],
+)
+def test_what_is_not_given_is_sent_as_the_call_says(
+    client: Any, name: str, given: tuple[Any, ...], told: dict[str, Any]
+) -> None:
+    assert json.loads(refused_question(client, name, *given).content) == told
+
+
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+@pytest.mark.parametrize(("timeout", "connect"), [(30.0, 5.0), (5.0, 5.0), (0.5, 0.5)])
+def test_each_wait_has_its_time_and_a_host_that_is_not_there_five_seconds(
+    client: Any, timeout: float, connect: float
+) -> None:
+    told = refused_question(client, "material", "a", timeout=timeout).extensions["timeout"]
+    assert told == {"connect": connect, "read": timeout, "write": timeout, "pool": timeout}
+    kept_back = refused_question(client, "wait", "1f", 1.5, timeout=timeout).extensions["timeout"]
+    assert kept_back["read"] == pytest.approx(timeout + 1.5, abs=0.1)
+    assert kept_back["write"] == timeout
+
+
+def test_an_answer_may_be_as_long_as_is_taken_and_no_byte_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stiction_client.client, "MOST_ANSWER_BYTES", 100)
+    request = httpx.Request("GET", "http://stiction/a", extensions={"timeout": {"read": 5.0}})
+    packed = gzip.compress(100 * b"a", mtime=0), gzip.compress(101 * b"a", mtime=0)
+    headers = {"Content-Encoding": "gzip"}
+    for whole, longer, more in ((100 * b"a", 101 * b"a", {}), (*packed, headers)):
+        content = stiction_client.client._Content(
+            httpx.Response(200, headers=more, stream=httpx.ByteStream(b""), request=request)
+        )
+        content.add(whole)
+        assert content.whole().content == 100 * b"a"
+        content = stiction_client.client._Content(
+            httpx.Response(200, headers=more, stream=httpx.ByteStream(b""), request=request)
+        )
+        with pytest.raises(UnexpectedAnswer, match="http://stiction/a answered with more than 100 bytes"):
+            content.add(longer)
+
+
+@pytest.mark.parametrize("seconds", [5.0, 5.1])
+def test_an_answer_is_whole_in_its_time(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(stiction_client.client, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    request = httpx.Request("GET", "http://stiction/a", extensions={"timeout": {"read": 5.0}})
+    content = stiction_client.client._Content(httpx.Response(200, stream=httpx.ByteStream(b""), request=request))
+    clock.now += seconds
+    if seconds > 5.0:
+        with pytest.raises(httpx.ReadTimeout):
+            content.add(b"a")
+    else:
+        content.add(b"a")
+        assert content.whole().content == b"a"
+
+
+@pytest.mark.parametrize("length", [80, 81])
+def test_an_address_is_shown_whole_up_to_eighty_characters(length: int) -> None:
+    url = "http://a:" + (length - 9) * "b"
+    with pytest.raises(InvalidArgument) as refusal:
+        FrictionClient(url)
+    shown = f"address is '{url}' (" if length == 80 else f"address is '{url[:80]}'… (81 characters) ("
+    assert str(refusal.value).startswith(shown)
+    assert str(refusal.value).endswith("allowed: one such as http://127.0.0.1:8000, in UTF-8")
