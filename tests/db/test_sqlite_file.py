@@ -355,3 +355,14 @@ def test_a_thread_that_looked_earlier_finds_no_fault_in_what_grew_meanwhile(
         monkeypatch.setattr(SqliteFile, "_stat", stat)
         monkeypatch.setattr(SqliteFile, "_ask", seen_before_others(ask))
         file.check_head()
+
+
+@pytest.mark.parametrize("size", [0, 1])
+def test_beside_a_log_without_a_byte_a_database_is_made(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "stiction.sqlite3"
+    Path(f"{path}-wal").write_bytes(bytes(size))
+    if size:
+        with pytest.raises(StorageUnavailable, match="is not there, and its"):
+            SqliteFile(str(path))._is_there()
+    else:
+        assert not SqliteFile(str(path))._is_there()

@@ -113,3 +113,12 @@ def test_a_stream_remembers_few_frames() -> None:
     for _ in range(300):
         watch.step(rng.standard_normal((4, 4, 3)))
     assert len(watch._kept) <= SATURATION.kept
+
+
+@pytest.mark.parametrize("copies", [1, 4])
+def test_frames_that_repeat_the_one_before_say_neither_that_nor_otherwise(copies: int) -> None:
+    """Each element is at the end now and then, so that none around tells: what else is read tells it, once a frame."""
+    field = np.zeros((40, 4, 4, 3))
+    field[..., 0] = np.minimum(np.random.default_rng(1).random((40, 4, 4)), 0.7)
+    found = saturated(np.repeat(field, copies, axis=0))
+    np.testing.assert_array_equal(found, np.repeat(field == 0.7, copies, axis=0))
