@@ -5,6 +5,7 @@ Each is a ``ProblemError``, whose ``type`` says the same; a type that this versi
 
 import math
 import re
+import sys
 from typing import Any
 
 from stiction_client import errors
@@ -89,10 +90,16 @@ class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
     def __init__(self, *args: Any, **named: Any) -> None:
         super().__init__(*args, **named)
         self.tangential_load, self.reason = math.nan, self.detail  # the load is what was asked
-        self.largest_load = float(self.facts.get("largest_load", math.nan))
-        self.normal_force = float(self.facts.get("normal_force", math.nan))
+        self.largest_load, self.normal_force = self._number("largest_load"), self._number("normal_force")
         self.cause = str(self.facts.get("cause", ""))
         self.largest_observed = self.facts.get("largest_observed")
+
+    def _number(self, name: str) -> float:
+        """A number of the problem; NaN where it tells none."""
+        told = self.facts.get(name)
+        if isinstance(told, bool) or not isinstance(told, int | float) or not abs(told) <= sys.float_info.max:
+            return math.nan
+        return float(told)
 
 
 class JobEnded(ProblemError):

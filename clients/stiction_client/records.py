@@ -66,7 +66,7 @@ class Job:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Job":
         """The job in the service's answer."""
-        return cls(**_values(cls, record))
+        return cls(**_values(cls, record) | {"status": recorded.text("status", record["status"])})
 
     @property
     def ended(self) -> bool:

@@ -1,3 +1,4 @@
+import math
 import pickle
 
 import httpx
@@ -60,3 +61,15 @@ def test_the_services_planner_refuses_as_the_clients_does() -> None:
     for error in (caught.value, pickle.loads(pickle.dumps(caught.value))):
         assert {name: getattr(error, name) for name in facts} == facts
         assert (str(error), error.reason) == ("d (409, /problems/no-feasible-force)", "d")
+
+
+@pytest.mark.parametrize("told", [None, "3.8", [3.8], {}, True, 10**400])
+def test_a_problem_whose_numbers_are_none_stays_that_problem(told: object) -> None:
+    """It had ended in an error of Python's own, which nobody catches who catches this package's."""
+    with (
+        client_of("/problems/no-feasible-force", 409, largest_load=told, normal_force=told) as client,
+        pytest.raises(problems.NoFeasibleForce) as caught,
+    ):
+        client.material("paper")
+    assert math.isnan(caught.value.largest_load)
+    assert math.isnan(caught.value.normal_force)
