@@ -34,6 +34,18 @@ def _named(folder: str) -> Path:
     return Path(folder)
 
 
+def _tell_keys(database: "Database") -> None:
+    """That keys of a backup are good again that were revoked since, which nobody would look for."""
+    from db.repositories import access_keys
+    from service.domain.keys import is_valid
+
+    with database.read() as session:
+        valid = sum(is_valid(key) for key in access_keys.list_all(session))
+    if valid:
+        told = "valid as in the backup: revoke those that were revoked since (`stiction keys list`)"
+        typer.echo(f"{valid} access key(s) are {told}", err=True)
+
+
 def _tell_without(left_out: list[str]) -> str:
     """Name the files that a copy lacks, and say how many they are."""
     for line in left_out:
@@ -147,6 +159,7 @@ def restore(
     with parts, opened(database_url, may_be_new=True) as database:
         taken_over_by = command_actor() if take_over else None
         left_out = copy_in(folder, database, opened_blobs(), _tell, taken_over_by=taken_over_by)
+        _tell_keys(database)
     typer.echo(f"restored from {folder}{_tell_without(left_out)}")
 
 

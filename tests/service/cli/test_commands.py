@@ -657,6 +657,22 @@ def test_a_backup_names_what_it_lacks_and_so_does_what_is_restored(
     assert run("db", "check")[0] == INPUT_REFUSED
 
 
+def test_a_restore_tells_that_keys_are_as_they_were(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was revoked since the backup is good again, and nothing said so."""
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "data"))
+    assert run("db", "upgrade")[0] == 0
+    made = [json.loads(run("keys", "create", name, "--json")[1])["id"] for name in ("a", "b", "c")]
+    run("keys", "revoke", made[0])
+    assert run("db", "backup", str(tmp_path / "copy"))[0] == 0
+    run("keys", "revoke", made[1])
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "again"))
+    code, _, err = run("db", "restore", str(tmp_path / "copy"))
+    assert (code, "2 access key(s) are valid as in the backup: revoke those that were revoked since" in err) == (
+        0,
+        True,
+    )
+
+
 def test_check_tells_files_that_are_missing_or_changed(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
