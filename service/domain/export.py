@@ -31,7 +31,8 @@ async def export(
     """The log as a file of format ``name``; what is not there yet is made in the share of ``owner``, after ``room``.
 
     The stored file is compared with its hash unless it was ``checked_within`` so many seconds (``BlobStore.path``).
-    Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, ``QueueFull``.
+    Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, ``QueueFull``,
+    and ``StorageUnavailable`` where a file would be made on a disk that is nearly full.
     """
     if not log.has_file:
         raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
@@ -45,6 +46,7 @@ async def export(
             there = Path(f"/dev/fd/{stored.fileno()}")  # also once it is deleted
             return LogFile(there, held.pop_all(), log.sha256)
         await room()
+        await context.threads.run(owner, context.require_room)
         spool = held.enter_context(context.blobs.spool())
         try:
             await context.readers.write(source, spool.path, name, owner)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from db.errors import StorageUnavailable
 from service import formats
 from service.domain.errors import FileDeleted, UnsupportedFormat
 from service.domain.export import LogFile, export
@@ -20,6 +21,7 @@ class Stores:
 
     def __init__(self, path: Path, error: Exception | None = None) -> None:
         self.path, self.error, self.said = path, error, list[Any]()
+        self.is_full = False
         self.blobs = self.readers = self.threads = self
 
     async def files(self, owner: str, hashes: list[str], checked_within: float) -> list[Path]:
@@ -28,6 +30,10 @@ class Stores:
 
     async def run(self, _owner: str, do: Any, *given: Any) -> Any:
         return do(*given)
+
+    def require_room(self) -> None:
+        if self.is_full:
+            raise StorageUnavailable("its disk is nearly full")
 
     async def write(self, source: Path, target: Path, name: str, owner: str) -> None:
         self.said.append(("write", source, name, owner))
@@ -73,6 +79,15 @@ def test_a_file_of_its_own_format_is_sent_as_it_is_also_once_it_is_deleted(store
     found.close.close()
     with pytest.raises(OSError, match="Bad file descriptor"):
         os.fstat(number)
+
+
+def test_nothing_is_made_on_a_disk_that_is_nearly_full(stores: Stores) -> None:
+    """A key without any quota left could fill it by slow downloads, while no upload was taken any more."""
+    stores.is_full = True
+    with pytest.raises(StorageUnavailable):
+        exported(stores, "mcap")
+    assert stores.said[1:] == ["room"]
+    exported(stores, "npz").close.close()
 
 
 def test_another_format_is_made_after_there_is_room_and_goes_at_the_end(stores: Stores) -> None:
