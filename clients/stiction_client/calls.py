@@ -268,7 +268,8 @@ def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:
         return replace(known, asked=asked)
     if known is not None and response.status_code in AWAY:
         raise ConnectionFailed(_summary(response))
-    return CachedModel(_material(name, _content(response)), response.headers.get("etag", ""), asked)
+    tag = response.headers.get("etag", "")
+    return CachedModel(_material(name, _content(response)), tag if tag.isascii() else "", asked)
 
 
 def rename_material(name: str, new_name: str) -> Call[Material]:

@@ -1062,3 +1062,17 @@ def test_an_address_is_shown_whole_up_to_eighty_characters(length: int) -> None:
     shown = f"address is '{url}' (" if length == 80 else f"address is '{url[:80]}'… (81 characters) ("
     assert str(refusal.value).startswith(shown)
     assert str(refusal.value).endswith("allowed: one such as http://127.0.0.1:8000, in UTF-8")
+
+
+def test_a_tag_that_cannot_be_sent_back_is_none(answers: SimpleNamespace) -> None:
+    """A proxy's: the next question had ended in an error of the address, whose it was not."""
+    asked = list[str | None]()
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request.headers.get("if-none-match"))
+        return httpx.Response(200, json=answers.material, headers=[(b"ETag", b'"\xe9"')])
+
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(answer)) as client:
+        client.model("paper")
+        client.model("paper")
+    assert asked == [None, ""]
