@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from db.records import Actor
+from service.domain.networks import network_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +27,8 @@ class Principal:
 
     @property
     def share(self) -> str:
-        """Whose share of the server it takes: its key's, or without one its address's."""
-        return self.key_id or f"address {self.address}"
+        """Whose share of the server it takes: its key's, or without one its address's, or network's."""
+        return self.key_id or f"address {network_of(str(self.address))}"
 
     @property
     def owners(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from db.repositories import access_keys
 from service.domain import keys
 from service.domain.context import Context
 from service.domain.keys import NO_KEY, is_loopback
+from service.domain.networks import network_of
 from service.http import origin, problems, sessions
 from service.http.access import CHALLENGE, CHALLENGE_OF_INVALID_KEY, EVERYTHING, Access, is_public
 from service.http.problems import (
@@ -248,7 +249,7 @@ def _counted_as(admitted: Access, connection: HTTPConnection) -> str | None:
 
 
 def _address(connection: HTTPConnection) -> str:
-    return f"address {connection.client.host if connection.client else ''}"
+    return f"address {network_of(connection.client.host) if connection.client else ''}"
 
 
 def _key_needed(connection: HTTPConnection) -> str:

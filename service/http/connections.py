@@ -19,6 +19,7 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.domain.networks import network_of
 from service.http import turns
 from service.http.joined_writes import JoinedWrites
 from service.http.problems import BAD_REQUEST, HEADERS_TOO_LARGE, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
@@ -251,7 +252,8 @@ class BoundedConnection(asyncio.Protocol):
         """
         count = len(self.connections)
         if self._per_address is not None and self.client is not None and count > self._per_address:
-            same = [each for each in self.connections if _address(each) == self.client[0]]
+            own = _address(self)
+            same = [each for each in self.connections if _address(each) == own]
             held = [each for each in same if not each.transport.is_closing() or _has_unsent(each)]
             if len(held) > self._per_address:
                 self._is_beyond = not self._close_one(held)
@@ -338,8 +340,8 @@ def _closing_unread(cycle: Any, send: Send) -> Send:
 
 
 def _address(connection: Any) -> str | None:
-    """Where a connection comes from; None by a socket in the file system."""
-    return None if connection.client is None else str(connection.client[0])
+    """Where a connection comes from, by IPv6 its network; None by a socket in the file system."""
+    return None if connection.client is None else network_of(str(connection.client[0]))
 
 
 def _has_unsent(connection: Any) -> bool:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
+from service.domain.networks import network_of
 from service.processes.fair_queue import UnboundedFairQueue
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
@@ -115,7 +116,7 @@ class Streams:
 
         Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many.
         """
-        session = Session(uuid.uuid4().hex, opening, key_id, key_id or f"address {address}")
+        session = Session(uuid.uuid4().hex, opening, key_id, key_id or f"address {network_of(address)}")
         self._check_room(session.owner)
         position, opening.position = packed("position", opening.position), b""
         self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it

@@ -17,6 +17,7 @@ from starlette.requests import ClientDisconnect
 from db.text import is_storable
 from service.domain.context import Context
 from service.domain.errors import UploadInterrupted, shown
+from service.domain.networks import network_of
 from service.http.bodies import MOST_FIELDS, limited, media_type
 from service.http.fair_route import FairRoute
 
@@ -66,7 +67,7 @@ class _FormRequest(Request):
         if len(body) <= SHORT_FORM:
             return _fields(body)
         context: Context = self.app.state.context
-        owner = f"forms of {self.client.host if self.client else ''}"
+        owner = f"forms of {network_of(self.client.host) if self.client else ''}"
         return await context.threads.run(owner, _fields, body, is_long=True)  # up to 60 ms, of escapes
 
 

@@ -654,3 +654,26 @@ def test_who_has_not_read_all_is_let_go_at_once(unsent: int) -> None:
     assert (one.transport.abort.call_count, one.transport.close.call_count) == (unsent, 1 - unsent)
     BoundedConnection._give_up(SimpleNamespace(transport=one.transport))  # type: ignore[arg-type]
     assert one.transport.abort.call_count == 2 * unsent
+
+
+def test_addresses_of_one_ipv6_network_have_the_connections_of_one(protocol: type[BoundedConnection]) -> None:
+    """One machine has as many of them as it likes: five held all connections, and nobody needs a key for that."""
+    config, state = (
+        uvicorn.Config(hello, lifespan="off", ws="none", limit_concurrency=100),
+        uvicorn.server.ServerState(),
+    )
+    config.load()
+    busy = {"is_closing.return_value": False, "get_write_buffer_size.return_value": 0}
+    held = [Mock(client=(f"fd00:1::{k:x}", 1, 0, 0), transport=Mock(**busy), is_let_go=False) for k in range(10)]
+    state.connections.update(held)
+
+    async def is_beyond(host: str) -> bool:
+        transport = Mock(**busy)
+        transport.get_extra_info = lambda name, default=None: (host, 5) if name == "peername" else default
+        another = protocol(config, state, {}, per_address=10)
+        another.connection_made(transport)
+        state.connections.discard(another)
+        return another._is_beyond
+
+    assert asyncio.run(is_beyond("fd00:1::ffff"))
+    assert not asyncio.run(is_beyond("fd00:2::1"))
