@@ -1,10 +1,13 @@
 import webbrowser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from service.cli import main
+from service.cli import main, running
 from service.cli.exit_codes import INPUT_REFUSED
+from service.observability.logs import Logs
+from service.settings import Settings
 from tests import forking
 
 
@@ -57,3 +60,16 @@ def test_the_dashboard_is_opened_or_its_address_printed(
     assert end.value.code == 0
     assert opened == [url]
     assert capsys.readouterr().out == ("" if has_browser else f"{url}\n")
+
+
+@pytest.mark.parametrize(("form", "level"), [("json", "warning"), ("text", "debug")])
+def test_a_command_that_serves_logs_as_its_settings_say_and_names_what_is_no_setting(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, form: str, level: str
+) -> None:
+    configured: list[Any] = []
+    monkeypatch.setattr("service.observability.logs.configure", configured.append)
+    monkeypatch.setattr("service.processes.freed_memory.keep", lambda: configured.append("keep"))
+    monkeypatch.setenv("STICTION_PROT", "80")
+    running._prepare(Settings.model_validate({"log_format": form, "log_level": level}))
+    assert configured == [Logs(form, level), "keep"]  # type: ignore[arg-type]
+    assert caplog.messages == ["STICTION_PROT is set and is no setting; allowed: those of docs/settings.md"]

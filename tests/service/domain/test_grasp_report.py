@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from db.records import ContactFriction, Finding
+from estimators import WorkingPoint, next_grasp
 from service.domain.doubtful_logs import with_doubts
 from service.domain.grasp_report import inspect_grasp, report_of_log, report_of_stored
 from service.domain.stored_results import encode_history, encode_samples
 from service.formatting import NOTHING
+from service.report import wording
 from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Report, render
 from slipcore import GraspLog, detect_slip
@@ -150,3 +152,37 @@ def test_without_a_map_the_rest_is_told(seen: InspectedGrasp) -> None:
     report = grasp_report(replace(seen, slip=None))
     assert "Slip over time" not in [section.heading for section in report.sections]
     assert np.isfinite(len(render(report)))
+
+
+def test_the_summary_tells_what_a_grasp_alone_says_and_what_would_say_most(seen: InspectedGrasp) -> None:
+    assert seen.model is not None
+    report = grasp_report(seen)
+    middle = 0.5 * sum(seen.model.domain.normal_force)
+    support = seen.model.support_at(0.0, middle)
+    assert report.lead == f"Friction, from this grasp alone, is {support.kind}: {support.advice}."
+    assert report.steps == [
+        wording.record_next(next_grasp(seen.model, WorkingPoint(middle), grasps=1)),
+        "Upload it with others of its material, and ask how hard to grip that.",
+    ]
+    facts = {fact.name: fact.value for fact in report.facts}
+    assert list(facts)[2:6] == [
+        "Friction samples", "Least stick ratio", "Frames of gross slip", "Findings against it"
+    ]  # fmt: skip
+    assert float(facts["Least stick ratio"]) == pytest.approx(seen.detection.stick_ratio_min, abs=5e-3)
+    assert list(report.facts[6:]) == list(seen.grasp_facts)
+    assert [section.folded for section in report.sections] == [False, True, True]
+
+
+def test_what_cannot_be_fitted_is_recorded_again_after_what_was_found_is_mended(seen: InspectedGrasp) -> None:
+    doubt = Finding("slow frames", "seen", "ask for more frames")
+    found = replace(seen.detection, findings=(doubt,))
+    report = grasp_report(replace(seen, model=None, refusal="nothing slips", detection=found))
+    assert report.lead == "This grasp alone gives no friction: nothing slips."
+    assert report.steps == [
+        "slow frames: ask for more frames.",
+        "Record another grasp of the same material, or load this one further, until parts of it slip.",
+    ]
+    (table,) = report.sections[-2].tables
+    assert [list(row) for row in table.rows] == [["slow frames", "seen", "ask for more frames"]]
+    noted = grasp_report(replace(seen, detection=found))
+    assert "Record the grasp again once that is mended." not in noted.steps  # a note alone spoils nothing

@@ -136,3 +136,14 @@ def test_noise_is_told_by_second_differences() -> None:
     assert _noise(3.0 * rng.standard_normal((4, 5000))) == pytest.approx(3.0, rel=0.03)
     assert _noise(np.arange(10.0)) == 0.0  # a ramp is no noise
     assert _noise(np.array([1.0, -1.0])) == 0.0
+
+
+def test_motion_sideways_is_told_in_micrometres_beside_the_depth() -> None:
+    told = str(press_fault(press(moved=(0.3, 0.4))))
+    assert "markers go 500 µm sideways while they are pressed 1e+03 µm in" in told
+    x, y = np.moveaxis(places()[..., :2], -1, 0)
+    turned = 0.2 * LOAD[:, None, None, None] * np.stack([-y, x, np.zeros_like(x)], axis=-1)
+    log = straight()
+    seen = find_press(replace(log, displacement=log.displacement + turned))
+    radius = np.sqrt((places()[seen.footprint][:, :2] ** 2).sum(axis=1).mean())
+    assert f"markers turn by {1e6 * 0.2 * radius:.3g} µm at the rim of the contact" in str(press_fault(seen))
