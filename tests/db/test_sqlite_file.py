@@ -366,3 +366,16 @@ def test_beside_a_log_without_a_byte_a_database_is_made(tmp_path: Path, size: in
             SqliteFile(str(path))._is_there()
     else:
         assert not SqliteFile(str(path))._is_there()
+
+
+def test_a_checkpoint_brings_what_was_written_into_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        database.checkpoint()
+        before = path.read_bytes()
+        with database.write() as session:
+            session.connection().exec_driver_sql("CREATE TABLE more (something)")
+        assert path.read_bytes() == before
+        database.checkpoint()
+        assert b"CREATE TABLE more" in path.read_bytes()
