@@ -58,7 +58,6 @@ def tangential_ramp(
     without normal–tangential coupling. Raises ``InvalidInput``.
     """
     ramp = choose_options(RampDefaults, options)
-    check_range("friction", ramp.friction, above=0.0)
     check_range("normal_force", ramp.normal_force, above=0.0, unit="N")
     check_range("marker_noise", marker_noise, at_least=0.0, unit="m")
     check_range("force_noise", force_noise, at_least=0.0, unit="N")
