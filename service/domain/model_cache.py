@@ -202,7 +202,8 @@ class _Current(NamedTuple):
 def _current(session: Session, ids: Mapping[str, int], method: str) -> dict[str, _Current]:
     """The current models by a method, or the recommended ones, of materials by their names, in one query.
 
-    Raises ``NoModel``.
+    With the one for their keys (5 µs in SQLite) it takes 1.4 ms of CPU; joined to one it took 1.8, for SQLAlchemy makes
+    up a statement of that size anew each time. Raises ``NoModel``.
     """
     models = friction_models.all_current(session, list(ids.values()))
     return {
