@@ -46,6 +46,10 @@ SLIDING = FRICTION * FORCE
 WIDTHS = (2.1, 2.13, 2.17, 2.2, 2.26)
 """Of grids, in contact radii: on each, cells lie otherwise on the contact's edge, and single ones scatter by that."""
 TOLERANCES = (1e-2, 1e-4, 1e-7)
+LOOP = (0.5, 0.9, 0.4, 0.0, -0.5, -0.9, -0.3, 0.5, 0.9)
+"""Loads, as shares of μF_N, that turn back twice."""
+POISSON = 0.45
+"""Of the body in cases without a closed form."""
 SCENES = (
     "table1_condition1",
     "table1_condition2",
@@ -163,7 +167,7 @@ def stepped(problem: ContactProblem, grid: Grid, tolerance: float, loads: list[S
     return list(QuasiStatic(problem, grid, tolerance, 1e-2 * tolerance).run(loads))
 
 
-# Cases with a closed form: error of one run
+# Cases with a closed form, or a finer run: error of one run
 
 
 def hertz(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
@@ -188,9 +192,9 @@ def contact_area(grid: Grid, tolerance: float, *, corrected: bool = False) -> fl
     return float(abs(shares.sum() * grid.cell_area / (np.pi * HERTZ.contact_radius**2) - 1.0))
 
 
-def stresses(results: list[StepResult], grid: Grid, *, corrected: bool) -> list[FloatArray]:
+def stresses(results: list[StepResult], grid: Grid, *, corrected: bool, poisson: float = 0.0) -> list[FloatArray]:
     """Stress of each step [3, ny, nx] Pa, of the cells or, by what is known of edges, at their centres."""
-    forces = centre_forces(results) if corrected else (result.force for result in results)
+    forces = centre_forces(results, poisson) if corrected else (result.force for result in results)
     return [force / grid.cell_area for force in forces]
 
 
@@ -203,7 +207,7 @@ def cattaneo_mindlin(grid: Grid, tolerance: float, *, corrected: bool = False) -
 
 def reversal(grid: Grid, tolerance: float, *, corrected: bool = False) -> float:
     """Traction on a loop between ±0.9 μF_N, ν = 0; the largest error, of the traction at the peak."""
-    forces = SLIDING * np.array([0.0, 0.5, 0.9, 0.4, 0.0, -0.5, -0.9, -0.3, 0.5, 0.9])
+    forces = SLIDING * np.array([0.0, *LOOP])
     r = np.hypot(*grid.points())
     exact, errors = MindlinDeresiewicz(HERTZ, FRICTION), []
     peak = np.sqrt((exact.load(FORCE, 0.9 * SLIDING).traction(r) ** 2).sum())
@@ -219,22 +223,55 @@ def torsion(grid: Grid, tolerance: float, *, corrected: bool = False, poisson: f
     hertz = replace(HERTZ, compliance=reference.half_space(YOUNG, poisson))
     moment = 0.6 * sliding_moment(hertz, FRICTION)
     results = stepped(sphere(poisson), grid, tolerance, [shear(0.0), shear(0.0, moment)])
-    stress = stresses(results, grid, corrected=corrected)[-1]
+    stress = stresses(results, grid, corrected=corrected, poisson=poisson)[-1]
     x, y = grid.points()
     r = np.hypot(x, y)
     around = np.where(r > 0.0, np.stack((-y, x)) / np.where(r > 0.0, r, 1.0), 0.0)
     return relative(stress[:2], TorsionPartialSlip(hertz, FRICTION, moment).traction(r) * around)
 
 
+def without_closed_form(grid: Grid, tolerance: float, *, corrected: bool = False, shares: tuple[float, ...]) -> float:
+    """Traction under loads along x, as shares of μF_N, at ν = 0.45; the largest error, of the traction at the peak."""
+    results = stepped(sphere(POISSON), grid, tolerance, [shear(0.0), *(shear(share * SLIDING) for share in shares)])
+    found = [stress[:2] for stress in stresses(results, grid, corrected=corrected, poisson=POISSON)]
+    exact = on_finer_cells(grid, shares)
+    errors = [np.linalg.norm(stress - right) for stress, right in zip(found, exact, strict=True)]
+    return float(max(errors) / max(np.linalg.norm(right) for right in exact))
+
+
+@cache
+def on_finer_cells(grid: Grid, shares: tuple[float, ...], poisson: float = POISSON) -> list[FloatArray]:
+    """The same tractions [2, ny, nx] Pa from a grid that lies at another angle, with edges corrected.
+
+    In fifths of a cell a turn by 0.8 and 0.6 is one by whole numbers: centres of cells are centres of finer ones, too.
+    """
+    turn, pitch = np.array([[0.8, 0.6], [-0.6, 0.8]]), grid.pitch[0] / 5.0
+    places = np.tensordot(turn, np.stack(grid.points()), 1) / pitch
+    centre = places[:, 0, 0] - np.rint(places[:, 0, 0])
+    half = int(1.03 * HERTZ.contact_radius / pitch)
+    finer = Grid((2 * half + 1, 2 * half + 1), (pitch, pitch), (float(centre[0] * pitch), float(centre[1] * pitch)))
+    along = SLIDING * np.append(turn[:, 0], 0.0)
+    loads = [StepLoad(FORCE, tangential=share * along) for share in (0.0, *shares)]
+    columns, rows = np.rint(places - centre[:, None, None]).astype(int) + half
+    known, found = np.maximum(np.abs(columns - half), np.abs(rows - half)) <= half, []
+    for stress in stresses(stepped(sphere(poisson), finer, 1e-7, loads), finer, corrected=True, poisson=poisson):
+        here = np.zeros((2, *grid.shape))
+        here[:, known] = stress[:2, rows[known], columns[known]]
+        found.append(np.tensordot(turn.T, here, 1))
+    return found
+
+
 CORRECTED = ", corrected"
 """Of a case in which what is known of edges is used."""
-_CASES = {
+_CASES: dict[str, Callable[..., float]] = {
     "Hertz": hertz,
     "Hertz, contact area": contact_area,
     "Cattaneo–Mindlin": cattaneo_mindlin,
     "unloading and reversal": reversal,
     "torsion": torsion,
-    "torsion, ν = 0.45": partial(torsion, poisson=0.45),
+    "torsion, ν = 0.45": partial(torsion, poisson=POISSON),
+    "one load, ν = 0.45": partial(without_closed_form, shares=(0.7,)),
+    "reversal, ν = 0.45": partial(without_closed_form, shares=LOOP),
 }
 CLOSED: dict[str, Errors] = {
     name + CORRECTED * corrected: partial(errors, corrected=corrected)
