@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -311,8 +312,8 @@ def closed_forms(cells: list[int]) -> Iterator[Point]:
     """All cases with a closed form, and the coupled one, over grids and tolerances."""
     cases = CLOSED | {"coupled, against 192²": coupled_reference(192)}
     for name, errors in cases.items():
-        for width in WIDTHS:  # compilation, and what a finer run is compared with
-            errors(hertz_grid(cells[0], width), TOLERANCES[0])
+        for count, width in product(cells, WIDTHS):  # compilation, and finer runs to compare with
+            errors(hertz_grid(count, width), TOLERANCES[0])
         for count in cells:
             for tolerance in TOLERANCES:
                 yield Point(name, count, tolerance, *timed(errors, count, tolerance))
