@@ -150,11 +150,9 @@ class ReconstructionDefaults(Options):
     """Motion of markers in the plane by a pressure over that by a shear, from which on they show where it presses."""
     covered: Annotated[float, Option(0.0, 1.0, "-", "its marker then lies inside")] = 0.5
     """Share of an element's area that must lie over the contact."""
-    resultant_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 2e-3
-    """Standard deviation of what bilinear tractions and the shape of the contact leave wrong of a resultant, as a share
-    of it."""
     element_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 1e-2
-    """The same of an element's force, as a share of the largest."""
+    """Standard deviation of what bilinear tractions and the shape of the contact leave wrong of an element's force, as
+    a share of the largest."""
     force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "neighbours err together, and by no mean less")] = 20.0
     """Least normal force of an element's friction sample over its deviation: more than of a sensor's own forces."""
     force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
@@ -257,6 +255,9 @@ class GelCalibrationDefaults(Options):
     """Density of a half-space, over the largest, from which a gel may be one."""
     identified: Annotated[float, Option(0.0, 1.0, "-", "half of its variance before")] = 0.5
     """Share of a quantity's information from the presses, under which it is said to be the prior's."""
+    resultant_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 2e-3
+    """Standard deviation of what bilinear tractions and the shape of the contact leave wrong of a press's resultant, as
+    a share of it."""
     young_modulus_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone, spheres and the scenes")] = 1e-2
     """Standard deviation of what bilinear tractions leave wrong of Young's modulus, as a share of it."""
     poisson_ratio_error: Annotated[float, Option(0.0, 0.1, "-", "an ellipse, a cone, spheres and the scenes")] = 3e-3

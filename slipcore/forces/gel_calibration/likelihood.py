@@ -192,7 +192,7 @@ def _resultant(
     pressure = traction.reshape(3, -1)[2]
     deviation = float(posterior.deviation(np.ones((1, len(pressure))))[2, 0])
     total = float(pressure.sum())
-    own = RECONSTRUCTION.resultant_error * abs(total)
+    own = GEL_CALIBRATION.resultant_error * abs(total)
     return nodes.area * total, nodes.area * float(np.hypot(deviation, own)), float(residual @ residual / seen)
 
 

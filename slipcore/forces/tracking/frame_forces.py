@@ -74,7 +74,9 @@ class Reader:
         response = observation.response[:, :, support].reshape(len(observation.noise), -1)
         elements = sensor.elements[:, support]
         total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
-        unresolved = Unresolved.of(sensor, key.fit)
+        depth_seen = sensor.depth_seen(observation)[elements.any(axis=1)]
+        shown = sensor.sees_along_surface and depth_seen.size > 0 and bool(depth_seen.all())
+        unresolved = Unresolved.of(sensor, key.fit, shown)
         return cls(sensor, key, response, elements, key.fit.deviation(elements), total, unresolved)
 
     @property
@@ -99,7 +101,7 @@ class Reader:
             force,
             np.hypot(of_elements.T.reshape(force.shape), largest),
             resultant,
-            np.hypot(of_resultant, RECONSTRUCTION.resultant_error * np.linalg.norm(resultant)),
+            of_resultant,
             _touching(-force[..., 2], by_noise) & covered,
         )
 

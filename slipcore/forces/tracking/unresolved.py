@@ -4,7 +4,10 @@ What a fit gives for a resultant or an element's force is linear in the data, so
 averaging kernel (Backus and Gilbert, Geophys. J. R. Astron. Soc. 16 (1968) 169) says how much of a traction anywhere it
 takes up. At the nodes that is right, as far as the data determine it; between them, and just outside the contact, it
 need not be. True tractions differ there from bilinear ones by no more than these change from node to node: that change,
-its sign unknown in each cell, times what the kernel is wrong by there, is the error.
+its sign unknown in each cell, times what the kernel is wrong by there, is the error. Midway a bilinear traction is the
+mean of its four nodes', so that one between the least and the largest of these differs from it by half of the change:
+so much counts in a resultant where markers in contact show depth beside their motion along the surface. Else, as in the
+plane alone, where the same data are to show the contact, and in an element's force all of it counts.
 """
 
 from dataclasses import dataclass
@@ -30,8 +33,8 @@ class Unresolved:
     elements: FloatArray
 
     @classmethod
-    def of(cls, sensor: SensorResponse, fit: TractionFit) -> "Unresolved":
-        """Of a fit on a sensor."""
+    def of(cls, sensor: SensorResponse, fit: TractionFit, all_shown: bool) -> "Unresolved":
+        """Of a fit on a sensor whose markers in contact are all seen along all axes, or not."""
         count = int(fit.support.sum())
         number = np.full(fit.support.shape, count)
         number[fit.support] = np.arange(count)
@@ -48,6 +51,8 @@ class Unresolved:
             own = slice(axis * len(places), (axis + 1) * len(places))
             whole[axis, own] -= sensor.load
             of_elements[axis, :, own] -= over[near]
+        if all_shown:
+            whole *= 0.5  # the most by which a traction between nodes differs from their mean, of their change
         return cls(corners[:, places], near, whole**2, of_elements**2)
 
     def deviations(self, traction: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+import pytest
 
 from slipcore.forces.inverse.fit import ObservationModel, TractionFit, TractionPrior, fit
 from slipcore.forces.inverse.prior import usual
@@ -12,6 +13,7 @@ from slipcore.forces.tracking.frame_forces import FrameForces, Reader, _touching
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
+from slipcore.forces.tracking.unresolved import Unresolved
 
 PITCH = 1e-3
 LINE = PITCH * (np.arange(9) - 4.0)
@@ -72,3 +74,39 @@ def test_a_fit_holds_while_data_move_by_little_more_than_the_noise_of_both() -> 
         assert key.holds(observation, np.add(key.data, [change, 0.0, 0.0])) == holds
     assert not key.holds(ObservationModel(np.zeros((3, 3, 1)), np.array([2.0, np.inf, np.inf])), key.data)
     assert not key.holds(observation, key.data[:2])
+
+
+def test_a_resultant_is_as_sure_as_noise_and_the_change_between_nodes_leave_it() -> None:
+    """Of a press without shear to 1e-4 along the surface: no share of it is unsure by itself."""
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49), (0, 1, 2))
+    observation = sensor.observation(np.full(len(sensor.response), 1e-7), KnownForce.of(None, None, 1)[0])
+    away = np.hypot(*sensor.nodes.places().T) / 3.6e-3
+    fitted = fit(observation, sensor.nodes, away < 1.0, TractionPrior(usual(), 0.1))
+    pressure = 0.05 * (1.0 - away[away < 1.0] ** 2)
+    data = observation.response[:, 2, fitted.support] @ pressure
+    found = Reader.of(sensor, Key(observation, data, fitted)).read(data, (9, 9))
+    total = sensor.load * pressure.sum()
+    assert abs(found.resultant[2] + total) < found.resultant_deviation[2] < 3e-3 * total
+    assert (found.resultant_deviation[:2] < 2e-4 * total).all()
+
+
+@pytest.mark.parametrize(("lost", "wider"), [(0, False), (40, True)])
+def test_a_marker_in_contact_whose_depth_is_not_seen_leaves_the_contact_less_sure(lost: int, wider: bool) -> None:
+    """Of 9 × 9 markers the first lies in a corner, the one numbered 40 in the middle of the contact."""
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49, 5e-3), (0, 1, 2))
+    noise = np.full(len(sensor.response), 1e-6)
+    noise[2 * 81 + lost] = np.inf
+    observation = sensor.observation(noise, KnownForce.of(None, None, 1)[0])
+    disk = np.hypot(*sensor.nodes.places().T) < 2.1e-3
+    key = Key(observation, np.zeros(len(noise) + 3), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.1)))
+    found, shown = Reader.of(sensor, key).unresolved, Unresolved.of(sensor, key.fit, all_shown=True)
+    np.testing.assert_allclose(found.resultant, (4.0 if wider else 1.0) * shown.resultant, rtol=1e-12)
+
+
+def test_depth_alone_leaves_a_resultant_as_unsure_as_the_whole_change_between_nodes() -> None:
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49, 2e-3), (2,))
+    observation = sensor.observation(np.full(len(sensor.response), 1e-6), KnownForce.of(None, None, 1)[0])
+    disk = np.hypot(*sensor.nodes.places().T) < 2.1e-3
+    key = Key(observation, np.zeros(84), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.1)))
+    whole = Unresolved.of(sensor, key.fit, all_shown=False)
+    np.testing.assert_allclose(Reader.of(sensor, key).unresolved.resultant, whole.resultant, rtol=1e-12)

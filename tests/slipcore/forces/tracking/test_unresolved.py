@@ -30,7 +30,7 @@ def sensor(thickness: float, axes: tuple[int, ...] = (0, 1, 2)) -> SensorRespons
 def test_errors_are_those_of_forces_found_from_what_tractions_between_nodes_move() -> None:
     seen = sensor(3e-3)
     found = contact(seen)
-    errors = Unresolved.of(seen, found)
+    errors = Unresolved.of(seen, found, all_shown=True)
     midway, touching = seen.nodes.between.places(), seen.nodes.places()[found.support]
     beside = np.flatnonzero((np.abs(midway[:, None] - touching).max(axis=2) < PITCH).any(axis=1))
     for axis, place in ((0, [0.5e-3, 0.5e-3]), (2, [0.5e-3, -1.5e-3]), (2, [2.5e-3, 0.5e-3])):
@@ -41,7 +41,8 @@ def test_errors_are_those_of_forces_found_from_what_tractions_between_nodes_move
         elements = traction.reshape(3, -1) @ seen.elements[:, found.support].T
         elements[axis] -= seen.elements_between[:, at]
         column = axis * len(beside) + int(np.flatnonzero(beside == at)[0])
-        np.testing.assert_allclose(np.sqrt(errors.resultant[:, column]), np.abs(resultant), rtol=1e-6, atol=1e-9)
+        half = 0.5 * np.abs(resultant)
+        np.testing.assert_allclose(np.sqrt(errors.resultant[:, column]), half, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(
             np.sqrt(errors.elements[:, :, column]), np.abs(elements[:, errors.near]), rtol=1e-6, atol=1e-9
         )
@@ -50,7 +51,7 @@ def test_errors_are_those_of_forces_found_from_what_tractions_between_nodes_move
 def test_a_traction_that_is_the_same_everywhere_is_resolved_but_for_the_rim() -> None:
     seen = sensor(3e-3)
     found = contact(seen)
-    errors = Unresolved.of(seen, found)
+    errors = Unresolved.of(seen, found, all_shown=True)
     flat = np.zeros((3, int(found.support.sum())))
     flat[2] = 0.01
     rim = (errors.corners == flat.shape[1]).any(axis=0)
@@ -68,5 +69,16 @@ def test_coarse_markers_beside_the_thickness_leave_more_of_a_force_open() -> Non
         away = np.hypot(*seen.nodes.places()[found.support].T) / 3e-3
         traction = np.zeros((3, len(away)))
         traction[2] = 0.05 * np.sqrt(1.0 - away**2)
-        shares.append(Unresolved.of(seen, found).deviations(traction)[1][2] / (seen.load * traction[2].sum()))
+        shares.append(
+            Unresolved.of(seen, found, all_shown=True).deviations(traction)[1][2] / (seen.load * traction[2].sum())
+        )
     assert shares[0] > 2.0 * shares[1] > 4.0 * shares[2]
+
+
+def test_where_all_is_seen_a_resultant_is_wrong_by_half_of_what_it_could_be_else() -> None:
+    seen = sensor(3e-3)
+    found = contact(seen)
+    flat = np.full((3, int(found.support.sum())), 0.01)
+    shown, hidden = (Unresolved.of(seen, found, all_shown=each).deviations(flat) for each in (True, False))
+    np.testing.assert_allclose(shown[1], 0.5 * hidden[1], rtol=1e-12)
+    np.testing.assert_array_equal(shown[0], hidden[0])
