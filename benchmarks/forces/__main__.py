@@ -3,12 +3,13 @@ docs/accuracy-forces.md` for its page.
 
 Presses whose forces are known (benchmarks/forces/scenes.py) are seen by simulated sensors, with depth and in the plane
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of 5
-mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's description,
-which is then wrong. It is also learnt from presses (benchmarks/forces/presses.py), frames are followed as they come
-(benchmarks/forces/stream.py), displacement is cut at the end of a range (benchmarks/forces/saturation.py), an
-independent solver's scenes are read (benchmarks/forces/references.py), grasps are taken to friction and slip with
-the gripper's force alone (benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py),
-and maps of height are read (benchmarks/forces/height_maps.py). In the plane the normal force on a half-space is given.
+mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, the criterion that chooses
+the prior's strength, and the gel's description, which is then wrong. It is also learnt from presses
+(benchmarks/forces/presses.py), frames are followed as they come (benchmarks/forces/stream.py), displacement is cut at
+the end of a range (benchmarks/forces/saturation.py), an independent solver's scenes are read
+(benchmarks/forces/references.py), grasps are taken to friction and slip with the gripper's force alone
+(benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py), and maps of height are read
+(benchmarks/forces/height_maps.py). In the plane the normal force on a half-space is given.
 Peers are given the same displacements. Errors are those of resultants, of the field of forces on elements, and their
 growth with noise; how often stated intervals of 95 % hold the truth is reported for each group.
 
@@ -27,6 +28,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,6 +48,7 @@ from benchmarks.forces.scenes import CONTACTS, LATTICES, Truth, press, repeated,
 from benchmarks.pages import options, picture_folder, save, table, write
 from slipcore import GraspLog
 from slipcore.forces import Gel, reconstruct
+from slipcore.forces.inverse.strength import Criterion
 from slipcore.frames import BoolArray, FloatArray
 
 NOISES = (0.0, 1e-6, 3e-6, 10e-6)
@@ -63,7 +66,7 @@ PLACE = (0.21, -0.34)
 """Middle of the contact beside that of the lattice, in pitches."""
 NORMAL_95 = 1.959964
 STICTION = "stiction"
-GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
+GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "criterion", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
 SLIP_GROUP, HEIGHT_GROUP = "slip by sensor", "height maps"
@@ -73,7 +76,9 @@ COVERED_CONTACTS = ("sphere", "ring")
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is seen: ``wrong`` names an entry of ``WRONG``, ``given`` tells whether the normal force is."""
+    """What is seen: ``wrong`` names an entry of ``WRONG``, ``given`` tells whether the normal force is, and
+    ``criterion`` chooses the prior's strength.
+    """
 
     group: str
     depth_seen: bool
@@ -84,6 +89,7 @@ class Case:
     noise: float = 1e-6
     wrong: str = ""
     given: bool = False
+    criterion: Criterion = "evidence"
 
     @property
     def seen(self) -> str:
@@ -133,6 +139,9 @@ def cases(group: str) -> Iterator[Case]:
             yield replace(base, marker_depth=1e-3)
         elif group == "lattice":
             yield from (replace(base, lattice="10 × 7", noise=noise) for noise in (1e-6, 10e-6))
+        elif group == "criterion":
+            yield from (replace(base, noise=noise, criterion=criterion)
+                        for noise in (1e-6, 10e-6) for criterion in get_args(Criterion))  # fmt: skip
         else:
             yield from (replace(base, wrong=wrong) for wrong in WRONG)
 
@@ -169,7 +178,7 @@ def score(case: Case, draws: int) -> Score:
     truth, log = shown(case, draws)
     true, gel = forces_of(truth.log), replace(case.true_gel(), **WRONG.get(case.wrong, {}))
     began = time.process_time()
-    found = reconstruct(log, gel, -truth.total[:, 2] if case.given else None, case.noise)
+    found = reconstruct(log, gel, -truth.total[:, 2] if case.given else None, case.noise, case.criterion)
     seconds = time.process_time() - began
     cells = found.kernel_width / np.sqrt(log.element_area)
     touched = found.contact | (true[..., 2] < 0.0)
@@ -262,6 +271,7 @@ def errors_table(scores: list[Score]) -> str:
     for entry in scores:
         case, held = entry.case, coverage([entry])
         gel = f"{case.gel}, described as {case.wrong}" if case.wrong else case.gel
+        gel += f", by {case.criterion}" if case.group == "criterion" else ""
         rows.append((
             case.seen, gel, case.contact, case.lattice, f"{1e3 * case.marker_depth:g}", f"{1e6 * case.noise:g}",
             percent(entry.resultant), percent(entry.elements), percent(entry.pooled), f"{entry.area:.2f}",

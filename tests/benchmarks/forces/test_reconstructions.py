@@ -12,6 +12,7 @@ from benchmarks.forces.__main__ import (
     STICTION,
     Case,
     Score,
+    cases,
     compared,
     coverage,
     coverage_table,
@@ -204,3 +205,15 @@ def test_an_independent_scene_is_read_with_the_load_that_it_was_made_with() -> N
     assert "| cond1 | with z | 1 | 10 | 20 | 50% | 100% | 0% | 4 |" in gel_references.references_table(
         [gel_references.Reference("cond1", "with z", 1e-6, (0.1, 0.2), (2, 4, 0), 4)]
     )
+
+
+def test_criteria_are_tried_on_the_same_presses_and_named_in_their_rows() -> None:
+    tried = list(cases("criterion"))
+    by_press = {(case.depth_seen, case.noise): {other.criterion for other in tried if other.noise == case.noise}
+                for case in tried}  # fmt: skip
+    assert len(by_press) == 4
+    assert all(names == {"evidence", "gcv", "discrepancy"} for names in by_press.values())
+    smooth = replace(tried[0], lattice="10 × 7", criterion="discrepancy")
+    scores = [score(replace(smooth, criterion="evidence"), 1), score(smooth, 1)]
+    assert scores[1].elements[0] > 1.02 * scores[0].elements[0]
+    assert "5 mm, by discrepancy | sphere" in errors_table(scores)
