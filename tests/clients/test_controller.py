@@ -21,7 +21,7 @@ from stiction_client import (
     SlipSamples,
     required_normal_force,
 )
-from stiction_client.controller import gains
+from stiction_client.controller import controller, gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import LoadEstimate, size_of
 from stiction_client.defaults import NORMAL_DEVIATIONS
@@ -587,3 +587,16 @@ def test_the_first_touch_lasts_until_a_load_rests(make_model: Make) -> None:
     assert GraspController.init(dataclasses.replace(settings, touch_force=0.1)).normal_force == SETTINGS.least_force
     with pytest.raises(InvalidArgument, match="touch_force"):
         dataclasses.replace(settings, touch_force=50.0)
+
+
+def test_samples_ask_for_a_force_only_while_it_is_lowered_and_once_there_are_enough() -> None:
+    few = LearnedFriction(sampled=(0.5,) * (SETTINGS.learn_frames - 1))
+    enough = LearnedFriction(sampled=(0.5,) * SETTINGS.learn_frames)
+    asked = {}
+    for mode in ("feel", "learn"):
+        for learned in (few, enough):
+            start = dataclasses.replace(GraspController.init(SETTINGS), mode=mode, learned=learned)
+            demands = controller._demands(start, Observation(0.0, 5.0, 2.0))
+            asked[mode, learned] = [each.reason for each in demands]
+            assert all(math.isfinite(each.force) for each in demands)
+    assert [key for key, reasons in asked.items() if "samples of slip" in reasons] == [("learn", enough)]
