@@ -3,6 +3,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -600,3 +601,14 @@ def test_samples_ask_for_a_force_only_while_it_is_lowered_and_once_there_are_eno
             asked[mode, learned] = [each.reason for each in demands]
             assert all(math.isfinite(each.force) for each in demands)
     assert [key for key, reasons in asked.items() if "samples of slip" in reasons] == [("learn", enough)]
+
+
+@pytest.mark.parametrize("mode", ["feel", "learn"])
+@pytest.mark.parametrize("waits", [False, True])
+def test_the_most_slippery_material_asks_for_a_force_only_while_one_is_to_be_recognised(mode: str, waits: bool) -> None:
+    among: Any = SimpleNamespace(waits=lambda *_: waits, least_friction=lambda *_: 0.9)
+    state = dataclasses.replace(GraspController.init(SETTINGS), mode=mode, recognition=among)
+    reasons = [each.reason for each in controller._demands(state, Observation(0.0, 5.0, 2.0))]
+    is_waited_for = waits and mode == "feel"
+    assert reasons.count("to be recognised") == (2 if is_waited_for else 0)
+    assert ("no stick ratio" in reasons or "friction unknown" in reasons) is (mode == "feel" and not waits)
