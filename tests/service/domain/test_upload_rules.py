@@ -1,5 +1,7 @@
 """What an upload is asked, and when the job of one that is sent again is done once more."""
 
+import asyncio
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +13,7 @@ from db.repositories import detections
 from db.repositories import sensors as stored_sensors
 from service import formats
 from service.domain import upload
-from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat
+from service.domain.errors import InvalidGraspLog, InvalidValue, TooLarge, UnsupportedFormat
 from slipcore.errors import InvalidInput
 
 GEL = Gel(2e5, 0.48, None, 0.0)
@@ -168,3 +170,31 @@ def test_a_log_is_corrected_anew_for_who_may_change_it(
     given.calibration = None
     principal: Any = None
     assert upload._is_calibrated_anew(SESSION, given, None, principal) is is_anew
+
+
+@pytest.mark.parametrize(("name", "made"), [("npz", 0), ("csv", 0), ("csv", 1)])
+def test_what_unpacks_to_too_much_is_refused_before_it_is_read_and_what_is_made_of_it_before_it_is_stored(
+    name: str, made: int
+) -> None:
+    """Whether the file itself says so, or only what is made of it turns out to be as large."""
+    most, read = 100 * 2**20, list[str]()
+    name = next(each for each, form in formats.FORMATS.items() if form.plain is (name == "npz"))
+    unpacked = most if made else most + 1
+
+    async def in_thread(_share: str, do: Any, *_given: Any, **_more: Any) -> Any:
+        return (name, unpacked) if do is upload._identify else None
+
+    async def reading(*_given: Any) -> str:
+        read.append(name)
+        return "description"
+
+    spool = SimpleNamespace(path="body", sync=None)
+    blobs = SimpleNamespace(spool=lambda: nullcontext(SimpleNamespace(path="made", adopt=None, size=most + made)))
+    context: Any = SimpleNamespace(
+        settings=SimpleNamespace(max_expansion=100), threads=SimpleNamespace(run=in_thread), blobs=blobs,
+        readers=SimpleNamespace(describe=reading, convert=reading),
+    )  # fmt: skip
+    request: Any = SimpleNamespace(principal=SimpleNamespace(share="me"), settings={})
+    with ExitStack() as spools, pytest.raises(TooLarge, match=f"body is {2**20} bytes that unpack to {most + 1} or"):
+        asyncio.run(upload._read(context, spools, spool, request, 2**20))  # type: ignore[arg-type]
+    assert read == ([name] if made else [])
