@@ -8,7 +8,7 @@ import pytest
 
 import estimators
 from estimators.defaults import CLUSTERS
-from estimators.linear.observations import observe
+from estimators.linear.observations import codes_of, observe
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
@@ -99,3 +99,16 @@ def test_merged_moments_of_several_grasps_are_not_those_of_one(samples: Make) ->
     one, other = (estimators.Moments.from_samples(samples(50)) for _ in range(2))
     kinds = [estimators.fit(data, "conjugate").diagnostics["cluster_kind"] for data in (one, one.merge(other))]
     assert kinds == ["none", "merged"]
+
+
+@pytest.mark.parametrize(
+    ("labels", "codes"),
+    [
+        ([7, 5, 7, 6], [2, 0, 2, 1]),
+        ([1000, 5, 1000, 77], [2, 0, 2, 1]),
+        ([-3, 10**12, -3], [0, 1, 0]),
+        ([4], [0]),
+    ],
+)
+def test_labels_are_numbered_in_their_order_however_far_apart_they_are(labels: list[int], codes: list[int]) -> None:
+    assert codes_of(np.array(labels)).tolist() == codes
