@@ -68,3 +68,22 @@ def test_only_what_is_named_is_deleted_and_other_files_are_no_blobs(aside: Folde
 )
 def test_text_without_nul_and_lone_surrogates_is_storable(text: str, storable: bool) -> None:
     assert is_storable(text) is storable
+
+
+@pytest.mark.parametrize("way", ["put", "recall"])
+def test_the_name_of_what_was_moved_reaches_the_disk_where_it_is_now(
+    aside: FolderQuarantine, monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    if way == "recall":
+        aside.put(ONE)
+    synced: list[tuple[str, bool]] = []
+    fsync = os.fsync
+
+    def noted(handle: int) -> None:
+        folder = Path(os.readlink(f"/proc/self/fd/{handle}"))
+        synced.append((folder.name, (folder / ONE).exists()))
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    getattr(aside, way)(ONE)
+    assert synced[-1] == (("quarantine" if way == "put" else "aa"), True)
