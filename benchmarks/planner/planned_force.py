@@ -85,12 +85,17 @@ def of_planner(found: FittedModel) -> FrictionModel:
     return FrictionModel(**told, material="new", version=1)
 
 
-def cases(seed: int, median: float, known: Sequence[FittedModel]) -> list[Case]:
-    """All of one material, of whose sensor so many others are ``known``."""
+def material(seed: int, median: float, count: int) -> tuple[Kind, list[Moments], NDArray[np.float64]]:
+    """One of a population, so many logs of it, and the forces, N, that hold its loads in the hand of who knows all."""
     rng = np.random.default_rng([seed, round(1e6 * median)])
     kind = scatters(drawn(median, rng))
-    logs = [Moments.from_samples(grasp(kind, rng)) for _ in range(max(LOGS))]
-    least = rng.uniform(*FORCES, LOADS)
+    logs = [Moments.from_samples(grasp(kind, rng)) for _ in range(count)]
+    return kind, logs, rng.uniform(*FORCES, LOADS)
+
+
+def cases(seed: int, median: float, known: Sequence[FittedModel]) -> list[Case]:
+    """All of one material, of whose sensor so many others are ``known``."""
+    kind, logs, least = material(seed, median, max(LOGS))
     loads = {asked: np.array([load_of(kind, float(force), asked) for force in least]) for asked in ASKED}
     found = []
     for others, count, asked in product(OTHERS, LOGS, ASKED):
@@ -139,10 +144,8 @@ class Step(NamedTuple):
 
 def steps(seed: int, median: float) -> list[Step]:
     """All steps of one material, without other materials."""
-    rng = np.random.default_rng([seed, round(1e6 * median)])
-    kind = scatters(drawn(median, rng))
-    moments = {str(k): Moments.from_samples(grasp(kind, rng)) for k in range(NESTED[-1][1] + 1)}
-    least = rng.uniform(*FORCES, LOADS)
+    kind, came, least = material(seed, median, NESTED[-1][1] + 1)
+    moments = {str(k): log for k, log in enumerate(came)}
     loads = np.array([load_of(kind, float(force), ASKED[0]) for force in least])
     found, before, held = list[Step](), None, np.full(LOADS, np.inf)
     for count in range(1, len(moments) + 1):
