@@ -175,6 +175,12 @@ class NumericsDefaults(Options):
     """By which forces are divided (``detection/forces_only``)."""
     least_lever: Annotated[float, Option(1e-12, 1e-3, "m", "far below a pitch")] = 1e-9
     """Of the moment of a contact's forces."""
+    slip_limits: Annotated[int, Option(2, 32, "-", "steps of 65 %; with twelve F1 differs by 0.001")] = 8
+    """How many limits of slip are considered (``detection/filter/slip_limit.py``)."""
+    surest_limit: Annotated[float, Option(0.1, 10.0, "log-odds", "2 %: more is bounded anyhow")] = 4.0
+    """Most that one of them says of an element."""
+    least_ratio: Annotated[float, Option(1e-12, 1e-3, "-", "far below any of them")] = 1e-6
+    """Of motion to depth, of which a logarithm is taken."""
     stretch_variance: Annotated[float, Option(0.0, 1e-4, "-", "rounding of a fit of many points")] = 1e-14
     """Allowed beside what linear theory of a rotation makes."""
     yaw_variance: Annotated[float, Option(0.0, 1e-4, "rad²", "rounding of a fit of many points")] = 1e-16
@@ -501,6 +507,36 @@ class FilterOptions(ContactOptions):
     """Least rate of the normal force over its noise."""
     stiffness_ratio: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67
     """Tangential over normal stiffness of a stuck contact."""
+    slip_limit_usual: Annotated[float, Option(1e-3, 100.0, "-", "friction of 0.37 on a half-space; tuning scenes")] = (
+        0.55
+    )
+    """Median motion of the object over an element before it slips, over the depth that it was pressed in."""
+    slip_limit_spread: Annotated[float, Option(0.01, 100.0, "-", "95 % between 0.17 and 1.8: friction 0.1 to 1.2")] = (
+        0.6
+    )
+    """Standard deviation of its logarithm before anything is seen."""
+    slip_limit_doubt: Annotated[float, Option(0.0, 0.999, "-", "bonded gels, soft objects, spots")] = 0.25
+    """How probable it is beforehand that no such limit holds."""
+    slip_limit_width: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes")] = 0.2
+    """Scale of the logistic function of the logarithm by which elements differ in it."""
+    slip_limit_lag: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.3
+    """Slip shows late in markers, so that limits look greater by this logarithm."""
+    slip_limit_trust: Annotated[float, Option(0.5, 1.0, "-", "tuning scenes")] = 0.8
+    """Largest probability that is believed of what an element's marker shows of slip, and of stick."""
+    slip_limit_evidence: Annotated[float, Option(0.0, 1e4, "elements", "tuning scenes: 10 to 40 differ by 0.001")] = (
+        20.0
+    )
+    """So many are independent in each motion that equals the mean depth."""
+    slip_limit_memory: Annotated[float, Option(1e-3, 1e6, "-", "tuning scenes: 2 to 1000 differ by 0.001")] = 2.0
+    """Motion over depth in which what is known of the limit fades."""
+    slip_limit_depth: Annotated[float, Option(0.0, 1e3, "standard deviations", "3 σ")] = 3.0
+    """Least mean depth at which it says anything."""
+    slip_limit_odds: Annotated[float, Option(0.0, 30.0, "log-odds", "tuning scenes: 1.5 to 4 differ by 0.001")] = 2.0
+    """Most that it says of an element; 0 leaves it out."""
+    slip_limit_least: Annotated[float, Option(1e-3, 1.0, "-", "friction of 0.08 on a half-space")] = 0.12
+    """Least limit that is considered."""
+    slip_limit_largest: Annotated[float, Option(0.1, 100.0, "-", "friction of 0.9 on a thin gel")] = 4.0
+    """Largest limit that is considered."""
     least_transition: Annotated[float, Option(1e-15, 0.1, "-", "numerics")] = 1e-06
     """Least probability of slip and of stick that is predicted."""
     largest_log_odds: Annotated[

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from slipcore.compilation import borrowed, compiled
 from slipcore.detection.filter.run import filter_frame
 from slipcore.detection.filter.smoothing import look_back
-from slipcore.detection.filter.state import PROBABILITY
+from slipcore.detection.filter.state import EXPECTED, PROBABILITY
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
 from slipcore.detection.shared.decision import apply_decision
@@ -115,7 +115,7 @@ def revise(
     posterior[:] = elements[last % kept, PROBABILITY]
     for i in range(last - 1, k - 1, -1):
         look_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, posterior)
-    decide(posterior, sensor.settings[THRESHOLD], room.decision)
+    decide(posterior, elements[k % kept, EXPECTED], sensor.settings[THRESHOLD], room.decision)
     before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
     frames = frame_at(log, k - 1), frame_at(log, k)
     results.touching[k], results.slipping[k] = apply_decision(

@@ -11,6 +11,7 @@ from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
     COMMON,
     DOUBTED_FRAMES,
+    EXPECTED,
     FORCE_FRAMES,
     LASTING,
     POSE,
@@ -44,7 +45,7 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
         known, posterior = posterior, np.empty(posterior.shape)
         look_back(before, after, known, least, posterior)
     decision = Decision(np.empty(posterior.shape, bool), np.empty(posterior.shape))
-    decide(posterior, settings[THRESHOLD], decision)
+    decide(posterior, elements[0][EXPECTED], settings[THRESHOLD], decision)
     return decision
 
 

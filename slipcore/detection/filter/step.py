@@ -13,9 +13,11 @@ from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
+from slipcore.detection.filter.slip_limit import step_limits
 from slipcore.detection.filter.state import (
     DOUBTED_FRAMES,
     END,
+    EXPECTED,
     FORCE_FRAMES,
     LASTING,
     ONSET,
@@ -65,7 +67,7 @@ def step_filter(
         after.elements[ONSET] = after.elements[END] = 0.0
     else:
         step_elements(sensor.position, last, frame, before, after, room, has_force, tuning)
-    decide(after.elements[PROBABILITY], tuning.threshold, room.decision)
+    decide(after.elements[PROBABILITY], after.elements[EXPECTED], tuning.threshold, room.decision)
 
 
 @compiled(inline=True)
@@ -139,6 +141,9 @@ def step_elements(
             left,
         )
         update_element(elements, after.elements, i, j, seen, increment, tuning)
+    sight = last.displacement, frame.displacement, after.contact, surface.stays
+    rows, noise_now = (deeper, told[1], room.series), (math.sqrt(variance), held, has_force)  # rows no longer needed
+    step_limits(elements, places, motion, sight, noise_now, tuning, rows, after)
 
 
 @compiled(inline=True)
@@ -274,12 +279,17 @@ def slip_of_neighbours(elements: FloatArray, contact: BoolArray, i: int, j: int)
 
 
 @compiled
-def decide(posterior: FloatArray, threshold: float, decision: Decision) -> None:
-    """Slip above the threshold; the probability is the posterior with its odds shifted to ½ there."""
+def decide(posterior: FloatArray, expected: FloatArray, threshold: float, decision: Decision) -> None:
+    """Slip above the threshold, by the posterior and the log-odds ``expected`` of it; the probability is that of both
+    with its odds shifted to ½ there.
+    """
     n, m = posterior.shape
     odds = (1.0 - threshold) / threshold
     for i in range(n):
         for j in range(m):
             p = posterior[i, j]
+            if expected[i, j] != 0.0:
+                likely = p * math.exp(expected[i, j])
+                p = likely / (1.0 - p + likely)
             decision.slip[i, j] = p > threshold
             decision.probability[i, j] = p * odds / (1.0 - p + p * odds)

@@ -73,6 +73,18 @@ class Tuning(NamedTuple):
     pressing_deviations: float
     pressing_force_deviations: float
     stiffness_ratio: float
+    slip_limit_usual: float
+    slip_limit_spread: float
+    slip_limit_doubt: float
+    slip_limit_width: float
+    slip_limit_lag: float
+    slip_limit_trust: float
+    slip_limit_evidence: float
+    slip_limit_memory: float
+    slip_limit_depth: float
+    slip_limit_odds: float
+    slip_limit_least: float
+    slip_limit_largest: float
     least_transition: float
     largest_log_odds: float
     threshold: float

@@ -150,7 +150,16 @@ def test_beyond_contact_and_lattice_all_neighbours_slip(place: tuple[int, int], 
 
 def test_slip_is_told_above_the_threshold_with_even_odds_there() -> None:
     decision = Decision(np.zeros((1, 4), bool), np.zeros((1, 4)))
-    unwrap(decide)(np.array([[0.0, 0.2, 0.21, 1.0]]), 0.2, decision)
+    unwrap(decide)(np.array([[0.0, 0.2, 0.21, 1.0]]), np.zeros((1, 4)), 0.2, decision)
     assert decision.slip.tolist() == [[False, False, True, True]]
     odds = 0.21 / 0.79 * 4.0  # four times what they are
     np.testing.assert_allclose(decision.probability, [[0.0, 0.5, odds / (1.0 + odds), 1.0]])
+
+
+def test_log_odds_that_are_expected_add_to_those_of_the_posterior() -> None:
+    decision = Decision(np.zeros((1, 4), bool), np.zeros((1, 4)))
+    unwrap(decide)(np.array([[0.0, 0.1, 0.3, 1.0]]), np.log([[3.0, 3.0, 0.5, 0.1]]), 0.2, decision)
+    assert decision.slip.tolist() == [[False, True, False, True]]
+    odds = np.array([[0.0, 4.0 * 3.0 / 9.0, 4.0 * 0.5 * 3.0 / 7.0]])
+    np.testing.assert_allclose(decision.probability[:, :3], odds / (1.0 + odds))
+    assert decision.probability[0, 3] == 1.0
