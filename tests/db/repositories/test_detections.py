@@ -12,15 +12,18 @@ from db.repositories import detections, grasp_logs, jobs, materials
 from db.repositories.detections import _copies
 
 
-def test_a_thousand_copies_of_one_grasp_are_told_in_a_moment() -> None:
-    """Each is alike all before it. They made a chain, along which each was gone for each: 4 s, in a transaction."""
+@pytest.mark.parametrize("step", [1, -1, 7])
+def test_a_thousand_copies_of_one_grasp_are_told_in_a_moment(step: int) -> None:
+    """Each is alike all before it, in whichever order that is read. They made a chain, along which each was gone for
+    each: 4 s, in a transaction.
+    """
     marks = [f"{number:064x}" for number in range(1000)]
     rows: Any = [
-        SimpleNamespace(number=k, id=mark, sha256=mark, samples=100, fingerprint=mark, alike=marks[:k])
-        for k, mark in enumerate(marks)
+        SimpleNamespace(number=k, id=mark, sha256=mark, samples=100, fingerprint=mark) for k, mark in enumerate(marks)
     ]
+    alike = [(marks[k * step % 1000], marks[: k * step % 1000]) for k in range(1000)]
     begin = process_time()
-    assert _copies(rows) == {marks[0]: marks[1:]}
+    assert _copies(rows, alike) == {marks[0]: marks[1:]}
     assert process_time() - begin < 1.0
 
 
