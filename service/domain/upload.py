@@ -86,10 +86,13 @@ class ReceivedLog:
 
 @dataclass(frozen=True, slots=True)
 class StoredUpload:
-    """A log that is stored, by this upload or, if not ``is_new``, by one before."""
+    """A log that is stored, by this upload or, if not ``is_new``, by one before; ``changes``: whether anything was
+    done, as where the job of one that is known is done again.
+    """
 
     log: StoredGraspLog
     is_new: bool
+    changes: bool = True
 
 
 async def wait_forever() -> None:
@@ -203,7 +206,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         is_others = received.names_sensor and known.sensor != sensor
         is_outdated = not is_others and _is_calibrated_anew(session, known, material_id, principal)
         if not (is_others or is_outdated or _may_differ(session, known)):
-            return StoredUpload(known, is_new)
+            return StoredUpload(known, is_new, changes=False)
         quotas.check_job(session, settings, principal.key_id)
         if is_others:
             quotas.check_change(session, settings, principal.key_id)

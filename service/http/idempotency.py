@@ -18,9 +18,6 @@ from service.http.problems import IDEMPOTENCY_KEY_REUSED, INVALID_REQUEST, Probl
 
 LONGEST_KEY = 200
 
-THERE_ALREADY = 200
-"""Status of an upload that stores nothing."""
-
 KeyHeader = Annotated[
     str | None,
     Header(
@@ -42,6 +39,10 @@ class RepeatableResponse:
     def response(self) -> JSONResponse:
         """The response of the framework."""
         return JSONResponse(self.body, self.status, {"Location": self.location} if self.location else {})
+
+
+class NothingDone(RepeatableResponse):
+    """To a request that changed nothing, and may be made again under its key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +84,8 @@ def respond_once(
 ) -> RepeatableResponse:
     """The response that ``make`` gives in this transaction, or the one that it gave under the same key.
 
-    Of what was there already nothing is kept, so that no key stores more by asking for that. Raises ``Problem`` for a
-    key under which something else was asked.
+    ``NothingDone`` is not kept, so that no key stores more by asking for what is there. Raises ``Problem`` for a key
+    under which something else was asked.
     """
     if key is None:
         return make()
@@ -95,7 +96,7 @@ def respond_once(
     if earlier is not None:
         return RepeatableResponse(**earlier)
     response = make()
-    if response.status == THERE_ALREADY:
+    if isinstance(response, NothingDone):
         idempotency_keys.release(session, key.owner, key.text)
     else:
         idempotency_keys.keep(session, key.owner, key.text, asdict(response))

@@ -26,6 +26,7 @@ from service.http.idempotency import (
     EarlierResponse,
     IdempotencyKey,
     KeyWithoutBody,
+    NothingDone,
     RepeatableResponse,
     find_earlier,
     respond_once,
@@ -149,7 +150,8 @@ def _find_earlier(context: Context, key: IdempotencyKey) -> EarlierResponse | No
 
 def _answer(stored: StoredUpload) -> RepeatableResponse:
     body = GraspLogOut.of(stored.log).model_dump(mode="json")
-    return RepeatableResponse(202 if stored.is_new else 200, f"/v1/grasp-logs/{stored.log.id}", body)
+    kind = RepeatableResponse if stored.changes else NothingDone
+    return kind(202 if stored.is_new else 200, f"/v1/grasp-logs/{stored.log.id}", body)
 
 
 @router.get(

@@ -110,6 +110,20 @@ def test_an_upload_of_what_is_stored_already_keeps_nothing(client: Any, database
     )
 
 
+def test_what_is_done_again_for_a_stored_log_is_done_once_under_its_key(client: Any, content: bytes) -> None:
+    """A late repetition set its sensor back, which somebody had changed since."""
+    upload, path = {"content": content, "headers": NPZ}, "/v1/grasp-logs?sensor="
+    log = send(client, f"{path}left", None, **upload).json()["id"]
+    first = send(client, f"{path}right", "b", **upload)
+    assert (first.status_code, first.json()["sensor"]) == (200, "right")
+    assert send(client, f"{path}left", "c", **upload).json()["sensor"] == "left"
+    again = send(client, f"{path}right", "b", **upload)
+    assert (again.status_code, again.content) == (200, first.content)
+    assert client.get(f"/v1/grasp-logs/{log}").json()["sensor"] == "left"
+    refused = send(client, f"{path}other", "b", **upload)
+    assert refused.json()["type"] == "/problems/idempotency-key-reused"
+
+
 @pytest.mark.parametrize("key", ["", " ", "a b", "x" * 201, "ü".encode()])
 def test_a_key_that_cannot_be_is_refused_by_name(client: Any, key: Any) -> None:
     answer = send(client, "/v1/materials", key, json={"name": "paper"})
