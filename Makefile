@@ -116,7 +116,7 @@ upgrade: constraints  ## resolve all pins afresh
 $(SHIPPED)/.installed: $(VENV)/.installed
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(SHIPPED)
 	$(UV) install --quiet --python $(SHIPPED)/bin/python --constraint constraints.txt --build-constraint constraints.txt \
-	    --editable ./clients --editable '.[dask,formats,notebook,otel,postgresql,s3]'
+	    --editable ./clients --editable '.[dask,formats,images,notebook,otel,postgresql,s3]'
 	rm -f $(SHIPPED)/lib/*/site-packages/*.dist-info/direct_url.json  # they say where this was built
 	@touch $@
 

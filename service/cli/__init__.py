@@ -26,6 +26,7 @@ from service.cli import (
     sensors,
     simulation,
     streaming,
+    tracking,
 )
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, exit_code, message
 
@@ -61,6 +62,7 @@ for command in (
     simulation.simulate,
     simulation.campaign,
     accuracy.accuracy,
+    tracking.track,
     local.detect,
     local.check,
     local.fit,

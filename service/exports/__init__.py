@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
-from service.formats import EXTRA, UnsupportedFormat
+from service.formats import EXTRA, import_with_library
 from service.whole_files import write_whole
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -71,11 +70,5 @@ def write(recordings: Sequence[DetectedLog], output: Path, name: str) -> None:
     target = TARGETS[name]
     if len(recordings) > 1 and not target.takes_many:
         raise InvalidInput("logs", len(recordings), f"one log a file for {name}")
-    try:
-        module = import_module(target.module)
-    except ModuleNotFoundError as error:
-        if str(error.name).startswith("service"):
-            raise
-        missing = f"{error.name}, which is not installed"
-        raise UnsupportedFormat(f"library of {name}", missing, target.install) from error
+    module = import_with_library(target.module, name, target.install)
     write_whole(output, lambda beside: module.write(recordings, beside))

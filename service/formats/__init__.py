@@ -25,6 +25,7 @@ __all__ = [
     "check_start",
     "episodes_of",
     "identify",
+    "import_with_library",
     "module_of",
     "parse_mapping",
     "read",
@@ -204,13 +205,20 @@ def check_start(path: Path, name: str) -> None:
 
 def module_of(name: str) -> ModuleType:
     """The module of a format, imported only now, with its library; ``UnsupportedFormat`` where that is missing."""
+    allowed = f"the extra `{EXTRA}`, which brings it: pip install 'stiction[{EXTRA}]'"
+    return import_with_library(f"service.formats.{FORMATS[name].reader.partition('.')[0]}", name, allowed)
+
+
+def import_with_library(module: str, name: str, install: str) -> ModuleType:
+    """A module of ours that needs a library; ``UnsupportedFormat`` naming what needs it, and what installs it, where
+    that is missing.
+    """
     try:
-        return importlib.import_module(f"service.formats.{FORMATS[name].reader.partition('.')[0]}")
+        return importlib.import_module(module)
     except ModuleNotFoundError as error:
         if str(error.name).startswith("service"):
             raise
-        allowed = f"the extra `{EXTRA}`, which brings it: pip install 'stiction[{EXTRA}]'"
-        raise UnsupportedFormat(f"library of {name}", f"{error.name}, which is not installed", allowed) from error
+        raise UnsupportedFormat(f"library of {name}", f"{error.name}, which is not installed", install) from error
 
 
 def _reader(name: str) -> Callable[..., GraspLog]:

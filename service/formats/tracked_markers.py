@@ -99,6 +99,18 @@ def at_rest(path: Path, given: Mapping[str, str] = MappingProxyType({})) -> dict
     return {tracks.names[k]: np.nanmedian(tracks.place[:, k], axis=0) for k in np.flatnonzero(seen)}
 
 
+def write(path: Path, place: FloatArray, frame_rate: float | None = None) -> None:
+    """Write a table of markers that were tracked in the plane: ``place`` [t, k, 2] px, NaN where lost, and the
+    ``frame_rate`` (1/s) where it is known.
+    """
+    with path.open("w", encoding="utf-8") as file:
+        if frame_rate is not None:
+            file.write(f"# frame_rate: {frame_rate!r}\n")
+        file.write("frame,marker,x,y\n")
+        for frame, row in enumerate(place.tolist()):
+            file.writelines(f"{frame},{marker},{x:.4f},{y:.4f}\n" for marker, (x, y) in enumerate(row))
+
+
 class RepeatedSetting(InvalidInput):
     """A setting that stands twice before the header."""
 
