@@ -143,8 +143,7 @@ def test_what_is_tracked_is_a_record_of_the_first_image_and_all_places() -> None
     assert error(seen.place[1], seen.place[0]) < 1e-6
 
 
-def test_a_scratch_and_an_edge_are_no_dots() -> None:
+def test_a_scratch_is_no_row_of_dots() -> None:
     image = draw(lattice(10, 10), noise=0.01)  # in the upper left quarter
     image[300:304, 60:400] -= 80
-    image[360:] -= 80
     assert len(find_dots(image, dark=True).rest) == 100
