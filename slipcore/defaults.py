@@ -655,12 +655,26 @@ class ForcesOnlyOptions(ContactOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoarseOptions(ForcesOnlyOptions):
-    """Method ``coarse``: those of ``forces_only``, and what it is joined with method ``filter`` by."""
+    """Method ``coarse``: those of ``forces_only``, and what it is joined with method ``filter`` and with layers by."""
 
     filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.5")] = 0.4
     """Weight of the log-odds of method ``filter`` beside those of the forces."""
     largest_sum: Annotated[float, Option(1.0, 30.0, "log-odds", "tuning scenes")] = 9.0
-    """Largest log-odds of either."""
+    """Largest log-odds of any of them."""
+    layers_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; more adds false slip")] = 1.5
+    """Weight of the log-odds of the layers that the contact has grown by, where elements are of one gel."""
+    layers: Annotated[int, Option(4, 1000, "-", "tuning scenes: twice as many change F1 by 0.001")] = 16
+    """How many layers a contact has, at most."""
+    layer_misfit: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes: forces err by 2 to 7 % of friction")] = 0.1
+    """By how much forces of elements differ from those of the layers, as a share of friction."""
+    layer_evidence: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; 1: elements err independently")] = 0.3
+    """Weight of these forces as evidence on friction."""
+    layer_stick_share: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes: half of an element's area")] = 0.31
+    """Share of an element's normal force in layers that stick at which it as likely slips as sticks."""
+    layer_stick_width: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.1
+    """Scale of the logistic function about it."""
+    spring_spread: Annotated[float, Option(1e-6, 10.0, "-", "tuning scenes: pillars up to 0.03, gels from 0.3")] = 0.1
+    """What of the elements' normal forces no common stiffness explains, as a share, at which layers count half."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

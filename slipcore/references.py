@@ -25,6 +25,7 @@ PAPERS = {
     "goyal1991": "Goyal, Ruina and Papadopoulos, Planar sliding with dry friction, part 1: limit surface and moment "
     "function, Wear 143 (1991) 307",
     "hertz1882": "Hertz, Über die Berührung fester elastischer Körper, J. reine angew. Math. 92 (1882) 156",
+    "jaeger1998": "Jäger, A new principle in contact mechanics, J. Tribol. 120 (1998) 677",
     "johnson1985": "Johnson, Contact Mechanics (1985)",
     "juarez2010": "Juárez and Steel, Model-based clustering of non-Gaussian panel data based on skew-t distributions, "
     "J. Bus. Econ. Stat. 28 (2010) 52",
@@ -71,7 +72,7 @@ DETECTION = {
     "force_ratio": ("song2014",),
     "strain_threshold": ("paper",),
     "forces_only": ("cattaneo1938", "mindlin1949", "mindlin1953", "khamis2018"),
-    "coarse": ("cattaneo1938", "mindlin1949", "mindlin1953", "khamis2018", "blom1988"),
+    "coarse": ("cattaneo1938", "mindlin1949", "mindlin1953", "jaeger1998", "khamis2018", "blom1988"),
 }
 """Papers behind each method of detection."""
 

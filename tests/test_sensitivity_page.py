@@ -38,6 +38,10 @@ ENTRIES = {
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor heading_length", "0 but of reconstructed forces, which the page's logs do not have"),
+    "coarse": (
+        "layers layers_weight layer_misfit layer_evidence layer_stick_share layer_stick_width spring_spread",
+        "tried on the tuning scenes; docs/sensors.md says how far F1 changes",
+    ),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (
         "descents free_frames free_motion least_known least_square_arm rank settled still",

@@ -1,17 +1,21 @@
-"""For arrays of few elements that measure displacement and forces: methods ``forces_only`` and ``filter``, joined.
+"""For arrays of few elements that measure displacement and forces: methods ``forces_only`` and ``filter``, and layers.
 
 An element that is not much smaller than the contact slips bit by bit: half of it slips while it still takes on load,
 and its mean displacement parts from the object's motion long before. How elements share the load says more there, and
-where several stick beside each other their markers show when one does not. Log-odds of both are added.
+where several stick beside each other their markers show when one does not. How far slip reaches in under a load follows
+from how the contact has grown (``layers``). Log-odds of all three are added.
 """
 
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import expit, logit
 
 from slipcore.defaults import CoarseOptions, FilterOptions
+from slipcore.detection.coarse.layers import Believed, Layers, PressedElements, believed, follow_layers, no_layers
 from slipcore.detection.filter import method as by_place
+from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.forces_only import method as by_force
 from slipcore.detection.shared.contact import ContactThreshold
 from slipcore.detection.shared.interface import Method, ObservedFrame
@@ -33,9 +37,10 @@ from slipcore.surface.strain import Lattice
 
 
 class CoarseState(NamedTuple):
-    """What each method remembers, and the last frame, as the filter sees it."""
+    """What each method remembers, the contact's layers, and the last frame, as the filter sees it."""
 
     forces: by_force.ForcesState
+    layers: Layers
     memory: Memory
     frame: FrameArrays
 
@@ -47,13 +52,13 @@ def init(lattice: Lattice, options: CoarseOptions) -> CoarseState:
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     frame = FrameArrays(-np.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
-    return CoarseState(by_force.init(lattice, options), memory, frame)
+    return CoarseState(by_force.init(lattice, options), no_layers(nothing.size, options), memory, frame)
 
 
 def step(
     state: CoarseState, lattice: Lattice, seen: ObservedFrame, options: CoarseOptions
 ) -> tuple[CoarseState, Decision]:
-    """Both, on the same contact; without forces the filter's word alone."""
+    """All three, on the same contact; without forces the filter's word alone."""
     forces, decision = by_force.step(state.forces, lattice, seen, options)
     last = unwritten(state.frame)
     frame = FrameArrays(
@@ -68,10 +73,33 @@ def step(
     velocity = np.empty((*seen.contact.shape, 2))
     arguments = _sensor(lattice, options), last, frame, state.memory, after
     by_place.METHOD.run(*map(tuple, arguments), velocity)  # as in ``detector.step``, lest another kernel is compiled
-    odds = _log_odds(after.probability, options)
+    odds, layers = _log_odds(after.probability, options), state.layers
     if seen.force.size:
+        layers = _follow_layers(state.layers, forces, lattice, seen, options)
         odds = _log_odds(decision.probability, options) + options.filter_weight * odds
-    return CoarseState(forces, after, frame), Decision(odds > 0.0, expit(odds))
+        odds += options.layers_weight * np.where(seen.stays, layers.odds.reshape(odds.shape), 0.0)
+    return CoarseState(forces, layers, after, frame), Decision(odds > 0.0, expit(odds))
+
+
+def _follow_layers(
+    layers: Layers, forces: by_force.ForcesState, lattice: Lattice, seen: ObservedFrame, options: CoarseOptions
+) -> Layers:
+    touching = seen.contact.ravel()
+    gain = low_pass(seen.interval, options.force_smoothing)
+    noise = 0.0 if np.isnan(seen.force_noise) else seen.force_noise * np.sqrt(gain / (2.0 - gain))
+    frame = PressedElements(
+        np.ascontiguousarray(lattice.position[..., :2]).reshape(-1, 2),
+        np.where(touching, forces.normal.ravel(), 0.0),
+        np.where(touching[:, None], forces.tangential[..., :2].reshape(-1, 2), 0.0),
+        -(seen.displacement * seen.normal).sum(axis=-1).ravel(),
+        float(noise),
+    )
+    return follow_layers(layers, frame, _believed(options))
+
+
+@cache
+def _believed(options: CoarseOptions) -> Believed:
+    return believed(options)
 
 
 def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
@@ -80,6 +108,7 @@ def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
     return odds
 
 
+@lru_cache(maxsize=16)
 def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
     """The lattice and options for the filter's kernel; contact is known, and only what pulls follows from them."""
     touch = np.array(ContactThreshold(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
