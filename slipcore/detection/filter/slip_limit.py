@@ -178,17 +178,17 @@ def step_limits(
     """Follow what elements take up, see ``follow_springs``, and fill what slip that lets expect; learn the limits.
 
     ``noise``: deviation of a marker coordinate, m, whether nothing has moved for so long that all stays as it was, and
-    whether forces are believed: these say more, and nothing is learnt or expected beside them, nor where elements are
-    hardly pressed in beyond the noise. ``room``: two rows [k], and [2, any].
+    whether measured forces are believed: these say more, and nothing is learnt or expected beside them, nor where
+    elements are hardly pressed in beyond the noise. ``room``: two rows [k], and [2, any].
     """
-    deviation, held, has_force = noise
+    deviation, held, measured = noise
     after, common = memory.elements, memory.common
     size, series = COUNT + 1, room[2]
     weights, likelihoods, shown_by = series[0, :size], series[0, size : 2 * size], series[1, :size]
     found = common[LIMITS : LIMITS + size]
     limit, springs, count = weigh_limits(found, tuning, weights), (room[0], room[1]), len(places)
     depth, moved = follow_springs(elements, places, motion, surface, deviation, limit, after, springs)
-    used = depth > tuning.slip_limit_depth * deviation * count and not has_force
+    used = depth > tuning.slip_limit_depth * deviation * count and not measured
     if used and not held:
         expect_slip(places, springs, deviation, weights, tuning, after, likelihoods, shown_by)
         learn_limits(shown_by, min(moved / depth, 1.0), count, tuning, found)

@@ -128,10 +128,7 @@ def test_a_lookahead_that_is_no_number_of_frames_is_refused(short_ramp: GraspLog
 
 
 def test_what_reconstructed_forces_are_unsure_of_is_noise_that_lasts(scene: Scene, f1_score: Score) -> None:
-    """An error that stays from frame to frame had counted as a force ratio, and so as slip.
-
-    Beside markers alone without what depth lets expect, which is not used with forces (docs/detector.md).
-    """
+    """An error that stays from frame to frame had counted as a force ratio, and so as slip."""
     log = scene("cond1", marker_noise=3e-6)
     assert log.force is not None
     assert log.truth is not None
@@ -142,7 +139,7 @@ def test_what_reconstructed_forces_are_unsure_of_is_noise_that_lasts(scene: Scen
     as_measured = detect_slip(replace(known, metadata={}))
     so_weighed = detect_slip(replace(known, metadata={}), **for_reconstructed_forces(0.03))
     np.testing.assert_array_equal(found.slip, so_weighed.slip)
-    alone = detect_slip(replace(known, force=None, metadata={}), slip_limit_odds=0.0)
+    alone = detect_slip(replace(known, force=None, metadata={}))
     assert f1_score(log, found) > f1_score(log, alone) - 0.01
     assert f1_score(log, found) > f1_score(log, as_measured) + 0.01
 
@@ -157,7 +154,7 @@ def test_when_a_load_is_turned_back_reconstructed_forces_do_not_hold_slip(scene:
     assert found > f1_score(log, detect_slip(known, heading_length=0.0)) + 0.01
     assert found > f1_score(log, detect_slip(replace(known, metadata={}))) + 0.02
     alone = replace(known, force=None, metadata={})
-    assert found > f1_score(log, detect_slip(alone, slip_limit_odds=0.0))
+    assert found > f1_score(log, detect_slip(alone))
 
 
 def test_forces_as_unsure_as_they_may_be_large_are_taken(short_ramp: GraspLog) -> None:
