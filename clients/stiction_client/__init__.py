@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from stiction_client import problems
 from stiction_client.errors import (
     AnswerTimedOut,
+    AnswerTooLarge,
     ConnectionFailed,
     InvalidArgument,
     JobCancelled,
@@ -130,6 +131,7 @@ __version__ = version("stiction-client")
 
 __all__ = [
     "AnswerTimedOut",
+    "AnswerTooLarge",
     "AsyncFrictionClient",
     "AuditEntry",
     "Command",

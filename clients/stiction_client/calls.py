@@ -22,12 +22,14 @@ import numpy as np
 from stiction_client import container, problems, recorded
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
+    AnswerTooLarge,
     ConnectionFailed,
     InvalidArgument,
     JobTimedOut,
     NoModel,
     ProblemError,
     StaleModel,
+    StictionError,
     UnexpectedAnswer,
 )
 from stiction_client.model import FrictionModel
@@ -115,8 +117,8 @@ class Pause:
 
 T = TypeVar("T")
 Call = Generator[Request | Pause, httpx.Response | None, T]
-Reply = httpx.Response | ConnectionFailed | None
-"""What a client got for a step: a response or a broken connection for a request, nothing for a pause."""
+Reply = httpx.Response | ConnectionFailed | AnswerTooLarge | None
+"""What a client got for a step: for a request a response, or why there is none, and nothing for a pause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ class Ended(Generic[T]):
 def advance(call: Call[T], answer: Reply) -> Request | Pause | Ended[T]:
     """Give a call the result of its last step (None at the start) and get its next one."""
     try:
-        return call.throw(answer) if isinstance(answer, ConnectionFailed) else call.send(answer)
+        return call.throw(answer) if isinstance(answer, StictionError) else call.send(answer)
     except StopIteration as end:
         return Ended(end.value)
 
@@ -198,13 +200,19 @@ def materials() -> Call[list[Material]]:
 def _listed(
     path: str, read: Callable[[Mapping[str, Any]], T], most: float = math.inf, page: int = PAGE, **asked: str | None
 ) -> Call[list[T]]:
-    """Ask for a list, a ``page`` after the other, until there are enough."""
+    """Ask for a list, a ``page`` after the other, until there are enough; pages that are too large in halves."""
     found: list[T] = []
     cursor: str | None = None
     known = set[str | None]()
     while True:
         limit = int(min(page, most - len(found)))
-        answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
+        try:
+            answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
+        except AnswerTooLarge:
+            if limit == 1:
+                raise
+            page = limit // 2
+            continue
         more, cursor = _record(lambda record: ([read(item) for item in record["items"]], _next(record)), answer)
         found += more
         if cursor is None or len(found) >= most:

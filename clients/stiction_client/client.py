@@ -16,7 +16,7 @@ from stiction_client import calls, heads
 from stiction_client.arguments import within
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
-from stiction_client.errors import ConnectionFailed, InvalidArgument, UnexpectedAnswer
+from stiction_client.errors import AnswerTooLarge, ConnectionFailed, InvalidArgument
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
@@ -301,6 +301,8 @@ class FrictionClient:
             return content.whole()
         except httpx.RequestError as error:
             return _broken(step, error)
+        except AnswerTooLarge as error:
+            return error
 
 
 class AsyncFrictionClient:
@@ -517,12 +519,14 @@ class AsyncFrictionClient:
             return content.whole()
         except httpx.RequestError as error:
             return _broken(step, error)
+        except AnswerTooLarge as error:
+            return error
 
 
 class _Content:
     """The content of an answer as it comes, within bounds, whoever answers.
 
-    Raises ``UnexpectedAnswer`` for more than a service says, ``httpx.ReadTimeout`` for what takes too long, and
+    Raises ``AnswerTooLarge`` for more than is taken, ``httpx.ReadTimeout`` for what takes too long, and
     ``httpx.DecodingError`` for what is not packed as it says, or ends before that does.
     """
 
@@ -545,7 +549,7 @@ class _Content:
                 raise httpx.DecodingError(f"the answer is no gzip stream: {error}", request=request) from error
         self._content += part
         if len(self._content) > MOST_ANSWER_BYTES:
-            raise UnexpectedAnswer(f"{request.url} answered with more than {MOST_ANSWER_BYTES} bytes")
+            raise AnswerTooLarge(f"{request.url} answered with more than {MOST_ANSWER_BYTES} bytes")
         if time.monotonic() > self._deadline:
             raise httpx.ReadTimeout("the answer began, and was not whole in time", request=request)
 

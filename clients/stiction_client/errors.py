@@ -59,6 +59,10 @@ class UnexpectedAnswer(StictionError):
     """The answer is not one that a Stiction service gives: a wrong address, a proxy, or another version."""
 
 
+class AnswerTooLarge(UnexpectedAnswer):
+    """The answer is longer than the client takes: 64 MiB, also once it is unpacked."""
+
+
 class StaleModel(UserWarning):
     """The service can't be reached, so that a model is used as it was when it was last asked for."""
 

@@ -16,6 +16,7 @@ import pytest
 
 import stiction_client
 from stiction_client import (
+    AnswerTooLarge,
     AsyncFrictionClient,
     ConnectionFailed,
     ContactFriction,
@@ -593,6 +594,28 @@ def test_more_entries_than_a_page_holds_are_asked_for_in_pages(
     assert len(ask(server, "jobs", None, 1200)) == 1200
     asked = [dict(request.url.params) for request in server.requests]
     assert asked == [{"limit": "1000"}, {"limit": "200", "cursor": "more"}]
+
+
+def test_a_page_that_is_too_large_is_asked_for_in_halves(
+    ask: Ask, service: Service, answers: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = httpx.Response(200, content=b" " * 100_000)
+    server = service(whole, whole, {"items": [answers.material], "next": "more"}, whole, {"items": [], "next": None})
+    monkeypatch.setattr(stiction_client.client, "MOST_ANSWER_BYTES", 50_000)
+    assert len(ask(server, "materials")) == 1
+    assert [dict(request.url.params) for request in server.requests] == [
+        {"limit": "100"}, {"limit": "50"}, {"limit": "25"},
+        {"limit": "25", "cursor": "more"}, {"limit": "12", "cursor": "more"},
+    ]  # fmt: skip
+
+
+def test_an_entry_that_is_too_large_by_itself_is_an_error(
+    ask: Ask, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = service(*[httpx.Response(200, content=b" " * 101)] * 7)
+    monkeypatch.setattr(stiction_client.client, "MOST_ANSWER_BYTES", 100)
+    with pytest.raises(AnswerTooLarge, match="limit=1 answered with more than 100 bytes"):
+        ask(server, "materials")
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "..."])

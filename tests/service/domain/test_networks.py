@@ -2,6 +2,7 @@
 
 import pytest
 
+from service.domain import networks
 from service.domain.networks import network_of
 from service.domain.principal import Principal
 
@@ -32,3 +33,10 @@ def test_shares_are_of_keys_or_else_of_networks() -> None:
     assert one.share == other.share == "address fd00:1::/64"
     assert Principal("a" * 12, address="fd00:1::1").share == "a" * 12
     assert one.actor.address == "fd00:1::1"
+
+
+def test_what_is_longer_than_an_address_is_not_kept() -> None:
+    """Forwarded addresses are what a trusted proxy passes on, which may be thousands of characters of a stranger's."""
+    known = networks._network.cache_info().currsize
+    assert network_of("a" * 65) == "a" * 65
+    assert networks._network.cache_info().currsize == known
