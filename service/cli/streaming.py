@@ -101,6 +101,7 @@ def _summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
         "stick_ratio_min": min(ratios, default=None),
         "macro_slip_frames": sum(state["macro_slip"] for state in states),
         "friction": states[-1]["friction"] if states else None,
+        "findings": states[-1].get("findings", []) if states else [],
     }
 
 
@@ -110,9 +111,14 @@ def _lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
         ("frames", f"{summary['frames']}{f', and {refused} refused' if refused else ''}"),
         ("least stick ratio", number(summary["stick_ratio_min"])),
         ("gross slip", f"in {summary['macro_slip_frames']} frames"),
-        ("friction", _friction(friction) if friction else "no samples: nothing slipped, or there are no forces"),
+        ("friction", _friction(friction) if friction else _why_none(summary["findings"])),
         ("grasp log", summary["grasp_log"]),
     ]
+
+
+def _why_none(findings: list[dict[str, str]]) -> str:
+    told = [f"{finding['evidence']}; {finding['remedy']}" for finding in findings]
+    return f"no samples: {'; '.join(told) or 'nothing slipped, or there are no forces'}"
 
 
 def _friction(found: dict[str, Any]) -> str:

@@ -93,6 +93,14 @@ def contradicted(share: float) -> "list[Finding]":
     return [Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")]
 
 
+def early_touch() -> "Finding":
+    """That something touched before a stream's forces could be known."""
+    from slipcore import Finding
+
+    evidence = "markers were moved before the noise of the sensor and its gel's response were known"
+    return Finding("no rest", evidence, "open the stream two seconds before the touch")
+
+
 def at_end_of_range(elements: int) -> "list[Finding]":
     """That some of a frame's displacements are at the end of the sensor's range, where so many elements' are."""
     from slipcore import Finding

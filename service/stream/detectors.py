@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +15,7 @@ import estimators
 import slipcore
 from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
+from service.domain.reconstruct import early_touch
 from service.formats.reading import Description, describe
 from service.processes.fair_executor import FairExecutor
 from service.report.wording import LEVELS
@@ -23,6 +24,7 @@ from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
 from service.stream.reconstructing import Reconstructing
 from slipcore import (
+    Finding,
     Frame,
     FrictionSamples,
     GraspLog,
@@ -31,6 +33,7 @@ from slipcore import (
     collect_samples,
     for_reconstructed_forces,
 )
+from slipcore.checks.recording import begun_in_contact
 from slipcore.defaults import FilterOptions
 from slipcore.frames import UNNAMED, check_displacement, check_gripper_report, check_span
 from stiction_client import container
@@ -98,8 +101,9 @@ class DetectorSession:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
     gripper ``reported`` in them; and the controller of the grip, where one was asked for.
 
-    ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``friction`` is what its
-    client is told, ``expected`` what those are who watch it; ``begun``: time of its first frame, s.
+    ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``findings``: what its first
+    frame shows to cost it friction. ``friction`` is what its client is told, ``expected`` what those are who watch it;
+    ``begun``: time of its first frame, s.
     """
 
     detector: "SlipDetector"
@@ -113,6 +117,7 @@ class DetectorSession:
     most_reported: float = 0.0
     grip: Grip | None = None
     forces: Reconstructing | None = None
+    findings: list[Finding] = field(default_factory=list)
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
     until_look: int = WINDOW
@@ -185,6 +190,8 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
     size = 0 if session.kept is None else _kept_bytes(session, frame)
     with_forces, force_report = _with_forces(session, frame, given)
     state, command = _detected(session, with_forces)
+    if session.begun is None:
+        session.findings = list(begun_in_contact(state.contact))
     session.begun = frame.time if session.begun is None else session.begun
     _keep(session, frame, given, size)
     _plan_look(session, with_forces, state)
@@ -384,7 +391,13 @@ def _answer(session: DetectorSession, number: int, state: SlipState) -> dict[str
         "contact": int(state.contact.sum()),
         "slip": np.flatnonzero(state.slip).tolist(),
         "friction": session.friction,
+        "findings": [asdict(finding) for finding in _findings(session)],
     }
+
+
+def _findings(session: DetectorSession) -> list[Finding]:
+    stream = None if session.forces is None else session.forces.stream
+    return [early_touch()] if stream is not None and stream.touched_early else session.findings
 
 
 def _log(session: DetectorSession, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:

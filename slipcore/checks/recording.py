@@ -6,6 +6,7 @@ import numpy as np
 
 from slipcore.checks.subject import Subject
 from slipcore.finding import Finding
+from slipcore.frames import BoolArray
 from slipcore.saturation import saturated
 
 
@@ -103,7 +104,12 @@ def saturation(seen: Subject) -> Iterator[Finding]:
 
 def rest_in_contact(seen: Subject) -> Iterator[Finding]:
     """A recording that begins after the touch."""
-    touching = int(np.count_nonzero(seen.history.contact[0]))
+    yield from begun_in_contact(seen.history.contact[0])
+
+
+def begun_in_contact(contact: BoolArray) -> Iterator[Finding]:
+    """That a recording begins after the touch, by which elements [n, m] touch in its first frame."""
+    touching = int(np.count_nonzero(contact))
     if touching:
         evidence = f"{touching} elements touch in the first frame"
         yield Finding("no rest", evidence, "begin the recording before the touch: what was before is not known")

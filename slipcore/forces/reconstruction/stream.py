@@ -80,6 +80,8 @@ class ForceStream:
         self._data = np.zeros(0)
         self._largest, self._compared, self._contradicted = 0.0, 0, 0
         self._touches, self._touched, self._until_look = 0, False, 0
+        self.touched_early = False
+        """Whether something touched before forces could be known: while it was waited for noise or set-up."""
         self._tracking: ContactTracking | None = None
         self._look: tuple[int, Future[ContactTracking]] | None = None
 
@@ -129,10 +131,10 @@ class ForceStream:
         if self._noise is None:
             return self._none("noise")
         frame = self._marker_frame(time, moved_by, seen, known)
-        if self._tracking is None:
-            return self._none("set-up")
-        self._seek(self._tracking, frame)
-        if not self._tracking.is_ready:
+        if self._tracking is not None:
+            self._seek(self._tracking, frame)
+        if self._tracking is None or not self._tracking.is_ready:
+            self.touched_early |= self._touched
             return self._none("set-up")
         if not self._touched:
             return self._untouched(self._tracking.sensor, frame)
@@ -187,12 +189,18 @@ class ForceStream:
             self._recent.append((time, displacement))
         if self._noise is None and len(self._recent) == FORCE_STREAM.frames:
             self._noise = self._noise_now()
+            self.touched_early = any(self._moves(moved_by) for _, moved_by in self._recent)
 
     def _noise_now(self) -> float:
         if self._given is not None:
             return self._given
         times, moved_by = zip(*self._recent, strict=True)
         return noise_of(np.array(times), np.stack(moved_by)[..., :2])
+
+    def _moves(self, displacement: FloatArray) -> bool:
+        """Whether markers are moved by more than noise, if all are seen."""
+        (data,), (seen,) = rows(displacement[None], np.ones((1, *displacement.shape), dtype=bool), self._axes)
+        return bool(moved(data, seen, self._noise or 0.0))
 
     def _marker_frame(self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.

@@ -305,7 +305,7 @@ def test_owners_are_printed_one_a_line(client: Mock, say: Say) -> None:
     client.remove_owner.assert_called_once_with("paper", "key:a")
 
 
-STATE = {"type": "state", "stick_ratio": 0.5, "macro_slip": False, "friction": None}
+STATE = {"type": "state", "stick_ratio": 0.5, "macro_slip": False, "friction": None, "findings": []}
 FRICTION = {"coefficients": [0.4, 0.0, 0.0], "standard_errors": [0.02, None, None], "samples": 12}
 
 
@@ -318,7 +318,8 @@ def test_what_a_replayed_stream_answered_is_counted() -> None:
     ]
     summary = streaming._summary(answers)
     assert summary == {
-        "frames": 3, "refused_frames": 1, "stick_ratio_min": 0.25, "macro_slip_frames": 1, "friction": FRICTION
+        "frames": 3, "refused_frames": 1, "stick_ratio_min": 0.25, "macro_slip_frames": 1, "friction": FRICTION,
+        "findings": [],
     }  # fmt: skip
     told = dict(streaming._lines(summary | {"grasp_log": None}))
     assert (told["frames"], told["least stick ratio"], told["gross slip"]) == (
@@ -330,6 +331,18 @@ def test_what_a_replayed_stream_answered_is_counted() -> None:
     nothing = streaming._summary([])
     assert (nothing["stick_ratio_min"], nothing["friction"]) == (None, None)
     assert dict(streaming._lines(nothing | {"grasp_log": None}))["frames"] == "0"
+
+
+def test_why_a_replayed_stream_has_no_samples_is_told_with_what_to_do() -> None:
+    finding = {"name": "no rest", "evidence": "3 elements touch in the first frame", "remedy": "begin before the touch"}
+    for findings, why in (
+        ([], "nothing slipped, or there are no forces"),
+        ([finding], "3 elements touch in the first frame; begin before the touch"),
+    ):
+        summary = streaming._summary([STATE | {"findings": findings}])
+        assert dict(streaming._lines(summary | {"grasp_log": None}))["friction"] == f"no samples: {why}"
+    of_before = {name: value for name, value in STATE.items() if name != "findings"}
+    assert streaming._summary([of_before])["findings"] == []
 
 
 @pytest.mark.parametrize("error", [None, math.inf])

@@ -282,3 +282,12 @@ def test_expected_friction_is_that_under_the_middle_of_the_forces_seen() -> None
     assert told["standard_errors"] == pytest.approx([0.02, 1.0, 2.0])
     assert (told["scale"], told["samples"]) == (0.02, 200)
     assert detectors._summary(cast("Any", unsure))["standard_errors"] == [None] * 3
+
+
+@pytest.mark.parametrize(("first", "told"), [(0, []), (30, ["76 elements touch in the first frame"])])
+@pytest.mark.usefixtures("sessions")
+def test_a_stream_that_begins_in_touch_says_so(ramp: GraspLog, first: int, told: list[str]) -> None:
+    detectors.open_session("one", ramp.position.tobytes(), ramp.grid, ramp.element_area, "filter", False, ROOM)
+    for k in (first, first + 1):
+        answer, _ = detectors.step("one", whole_frame(ramp, k))
+        assert [finding["evidence"] for finding in answer["findings"]] == told

@@ -169,3 +169,22 @@ def test_looks_that_go_on_failing_end_the_stream_s_forces(
     told = [detectors.step("one", frame(ramp, k))[0]["force"] for k in range(6)]
     assert told[-1] == {"source": "none", "reason": "looking for the contact failed"}
     assert caplog.text.count("a look for the contact failed") == reconstructing.MOST_FAILURES
+
+
+@pytest.mark.parametrize("first", [0, 20])
+def test_forces_that_come_after_the_touch_are_told_with_what_to_do(ramp: GraspLog, first: int) -> None:
+    """The ramp itself touches from its eighth frame on, when noise is not known yet."""
+    opened(ramp)
+    answers = [detectors.step("one", frame(ramp, k))[0] for k in range(first, first + 15)]
+    assert [answer["findings"] for answer in answers[:14]] == [[]] * 14
+    (finding,) = answers[14]["findings"]
+    assert (finding["name"], finding["remedy"]) == ("no rest", "open the stream two seconds before the touch")
+
+
+def test_who_waits_for_the_forces_before_the_touch_is_told_nothing(ramp: GraspLog) -> None:
+    opened(ramp)
+    for k in range(15):
+        still = ramp.displacement[k % 6].tobytes()
+        assert detectors.step("one", frame(ramp, k, displacement=still))[0]["findings"] == []
+    touched = frame(ramp, 15, displacement=ramp.displacement[30].tobytes())
+    assert detectors.step("one", touched)[0]["findings"] == []
