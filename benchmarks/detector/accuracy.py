@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from cycler import cycler
 from matplotlib.figure import Figure
 
 from benchmarks import pages
@@ -237,10 +238,15 @@ def _of_methods(rows: list[Summary]) -> str:
     return pages.table(("method", "F1", "worst", *PHASES, "onset", "false slip in pressing"), lines)
 
 
+LOOKS = cycler(marker=["o", "s"]) * cycler(color=[f"C{k}" for k in range(10)])
+"""Of 20 methods, each the same in all panels."""
+
+
 def draw(rows: list[Summary]) -> Figure:
     """F1 over noise, one panel for each kind of input of the unseen scenes."""
     figure = Figure(figsize=(11, 4), layout="constrained")
     panels = figure.subplots(1, len(INPUTS), sharey=True)
+    looks = dict(zip(dict.fromkeys(r.method for r in rows), LOOKS, strict=False))
     for axes, inputs in zip(panels, INPUTS, strict=True):
         chosen = [r for r in rows if r.inputs == inputs and r.scenes == "scoring"]
         for method in dict.fromkeys(r.method for r in chosen):
@@ -248,9 +254,9 @@ def draw(rows: list[Summary]) -> Figure:
             axes.plot(
                 [str(round(1e6 * r.noise)) for r in line],
                 [r.f1 for r in line],
-                marker="o",
                 lw=2.5 if method in ("filter", AHEAD) else 1.0,
                 label=method,
+                **looks[method],
             )
         axes.set(title=f"input: {inputs}", xlabel="marker noise, µm", ylim=(0.0, 1.0))
         axes.grid(alpha=0.3)
