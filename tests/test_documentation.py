@@ -163,3 +163,11 @@ def test_the_site_is_built_without_a_warning_and_asks_no_other_host(tmp_path: Pa
     assert "slipcore.detect_slip" in html
     assert re.findall(r"<(?:script|link)[^>]+(?:src|href)=.https?://[^>]+[.](?:js|css)", html) == []
     assert (tmp_path / "search" / "search_index.js").exists()
+
+
+@pytest.mark.parametrize("page", ["README", "docs/slip-benchmark"])
+def test_figures_at_the_head_are_those_of_the_benchmark_s_table(page: str) -> None:
+    table = re.search(r"<!-- table scores -->.*?<!-- end -->", (ROOT / "docs/slip-benchmark.md").read_text(), re.DOTALL)
+    assert table
+    head = next(line for line in (ROOT / f"{page}.md").read_text().splitlines() if "F1 of 0." in line)
+    assert set(re.findall(r"0\.\d{3}", head)) <= set(re.findall(r"0\.\d{3}", table.group()))
