@@ -310,11 +310,15 @@ def court_in_place(copy: ScratchCopy) -> Iterator[Court]:
     ("path", "old", "new", "test"),
     [
         ("program", "and", "or", "test_program.py::test_is_large"),
-        ("program", ">", ">=", ""),
+        pytest.param("program", ">", ">=", "", marks=pytest.mark.long),
         ("program", "3", "4", ""),  # a constant of a module: imported anew
-        ("kernels", "*", "/", "test_kernels.py::test_scaled"),  # of a function that ran at import
+        pytest.param(  # of a function that ran at import
+            "kernels", "*", "/", "test_kernels.py::test_scaled", marks=pytest.mark.long
+        ),
         ("kernels", "x * x", "None", "test_kernels.py::test_fourth_power"),  # compiled, with what calls it
-        ("kernels", "+", "-", "test_kernels.py::test_scaled"),  # of a function inside of another
+        pytest.param(  # of a function inside of another
+            "kernels", "+", "-", "test_kernels.py::test_scaled", marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_change_made_in_place_is_noticed_as_one_that_is_imported(

@@ -246,8 +246,8 @@ def test_a_bad_file_that_is_dropped_is_refused_above_the_form(tab: Tab, client: 
 
 
 @ON_SQLITE
-@pytest.mark.parametrize("typed", ["<img src=x onerror=document.title='run'>", "\u202eשלום", "🧤" * 50])
-def test_what_somebody_typed_runs_nothing(page: Tab, client: httpx.Client, typed: str, material: str) -> None:
+def test_what_somebody_typed_runs_nothing(page: Tab, client: httpx.Client, material: str) -> None:
+    typed = f"<img src=x onerror=document.title='run'>, \u202eשלום, {'🧤' * 50}"
     client.patch(f"/v1/materials/{material}", json={"description": typed}).raise_for_status()
     page.go(f"{str(client.base_url).rstrip('/')}/materials/{material.replace(' ', '%20')}")
     assert typed in page.run("document.querySelector('main').textContent")

@@ -74,7 +74,7 @@ def test_noise_around_a_contact_of_one_element_is_no_moment_on_it(noise: float) 
     assert 0.9 * 0.35 - 25.0 * noise < found.low < 0.35
 
 
-@pytest.mark.parametrize("seconds", [2.0, 30.0])
+@pytest.mark.parametrize("seconds", [2.0, pytest.param(30.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize("elements", [ONE_ELEMENT, np.ones((5, 5), bool)])
 def test_a_bound_lies_above_what_was_held_as_seldom_as_it_says(elements: np.ndarray, seconds: float) -> None:
     """Less the 3 % that resultants err by, which nothing here does: without noise subtracted 20 to 200 would."""
