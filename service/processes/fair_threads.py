@@ -4,12 +4,13 @@ The event loop's own few threads are left to the service itself: whatever waited
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
 from service.processes.fair_queue import UnboundedFairQueue
+from service.processes.to_its_end import to_its_end
 
 SHORT_AT_ONCE, LONG_AT_ONCE = 6, 2
 """Pieces of work that take some ms each, of which an owner has half at most, and of such as take seconds, of which each
@@ -32,19 +33,8 @@ class FairThreads:
         """The result of ``do``, or what it raised; ``is_long``: it may take seconds."""
         async with (self._long if is_long else self._short).turn(owner):
             run = asyncio.get_running_loop().run_in_executor
-            return await _to_its_end(run(self._executor, copy_context().run, do, *arguments))
+            return await to_its_end(run(self._executor, copy_context().run, do, *arguments))
 
     def stop(self) -> None:
         """End the threads once they have done their work."""
         self._executor.shutdown(wait=False)
-
-
-async def _to_its_end(work: Awaitable[Result]) -> Result:
-    future = asyncio.ensure_future(work)
-    try:
-        return await asyncio.shield(future)
-    except asyncio.CancelledError:
-        await asyncio.wait({future})
-        if not future.cancelled():
-            future.exception()  # nobody is there to be told
-        raise

@@ -1,4 +1,4 @@
-"""A process beside the server that does calls one after the other.
+"""A process beside the server that does calls one after the other, and long ones beside them.
 
 An executor of ``concurrent.futures`` does that with two threads and two queues in the server, which for a call of
 a tenth of a millisecond cost more than the call. Here it is one message each way, over a socket of the event loop.
@@ -9,14 +9,17 @@ import pickle
 import socket
 import struct
 import sys
-from collections import deque
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from itertools import count
 from multiprocessing.context import SpawnProcess
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from service.observability import logs
 from service.processes import spawned
+from service.processes.to_its_end import to_its_end
 
 LENGTH = struct.Struct("<Q")
 """In front of every message: its bytes."""
@@ -34,12 +37,26 @@ class ProcessEnded(Exception):
     """The process is gone, and with it all that it knew."""
 
 
+class _Call(NamedTuple):
+    """What is told to the process; its answer has the same ``number``."""
+
+    number: int
+    is_long: bool
+    do: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
 class SideProcess:
-    """Does what it is told, in the order in which it was told; made by ``start``."""
+    """Does what it is told, in the order in which it was told; made by ``start``.
+
+    A call that was sent cannot be called back: who is cancelled is so once it is answered, so that whoever counts the
+    calls that are under way counts it until then.
+    """
 
     def __init__(self, process: SpawnProcess, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._process, self._reader, self._writer = process, reader, writer
-        self._asked: deque[asyncio.Future[Any]] = deque()
+        self._asked: dict[int, asyncio.Future[Any]] = {}
+        self._numbers = count()
         self._reading = asyncio.create_task(self._read())
 
     @classmethod
@@ -51,14 +68,18 @@ class SideProcess:
             await asyncio.to_thread(process.start)
         return cls(process, *await asyncio.open_connection(sock=ours))
 
-    async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
-        """The result of ``do``, or what it raised; raises ``ProcessEnded``."""
+    async def call(self, do: Callable[..., Result], *arguments: Any, is_long: bool = False) -> Result:
+        """The result of ``do``, or what it raised; raises ``ProcessEnded``.
+
+        Those that are long are done in a thread, one after the other, and none of the others waits for them.
+        """
         if self._reading.done():
             raise ProcessEnded
-        self._send((do, arguments))
+        number = next(self._numbers)
+        self._send(_Call(number, is_long, do, arguments))
         answer: asyncio.Future[Result] = asyncio.get_running_loop().create_future()
-        self._asked.append(answer)
-        return await answer
+        self._asked[number] = answer
+        return await to_its_end(answer)
 
     async def stop(self) -> None:
         """End the process; what it is doing has some time left."""
@@ -67,37 +88,48 @@ class SideProcess:
         self._process.kill()
         await self._reading
 
-    def _send(self, message: Any) -> None:
+    def _send(self, message: _Call) -> None:
         content = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
         self._writer.write(LENGTH.pack(len(content)) + content)
 
     async def _read(self) -> None:
-        with suppress(asyncio.IncompleteReadError, OSError):
-            while True:
-                (length,) = LENGTH.unpack(await self._reader.readexactly(LENGTH.size))
-                result, error = pickle.loads(await self._reader.readexactly(length))
-                answer = self._asked.popleft()
-                if answer.done():  # nobody waits for it any more
-                    continue
-                if error is None:
-                    answer.set_result(result)
-                else:
-                    answer.set_exception(error)
-        self._writer.close()
-        for answer in self._asked:
-            if not answer.done():
-                answer.set_exception(ProcessEnded())
+        try:
+            with suppress(asyncio.IncompleteReadError, OSError):
+                while True:
+                    (length,) = LENGTH.unpack(await self._reader.readexactly(LENGTH.size))
+                    self._take(*pickle.loads(await self._reader.readexactly(length)))
+        finally:
+            self._writer.close()
+            for answer in self._asked.values():
+                if not answer.done():
+                    answer.set_exception(ProcessEnded())
+
+    def _take(self, number: int, result: Any, error: Exception | None) -> None:
+        answer = self._asked.pop(number)
+        if error is None:
+            answer.set_result(result)
+        else:
+            answer.set_exception(error)
 
 
 def _work(line: socket.socket, chosen: logs.Logs | None) -> None:
     """What the process does until nobody is at the other end."""
     spawned.start(chosen)
     sys.setswitchinterval(SWITCH_SECONDS)
-    with line, suppress(EOFError, ConnectionError):
-        while True:
-            do, arguments = _receive(line)
-            content = pickle.dumps(_outcome(do, arguments), pickle.HIGHEST_PROTOCOL)
+    one_by_one = threading.Lock()
+
+    def do(call: _Call) -> None:
+        content = pickle.dumps((call.number, *_outcome(call.do, call.arguments)), pickle.HIGHEST_PROTOCOL)
+        with one_by_one:
             line.sendall(LENGTH.pack(len(content)) + content)
+
+    with line, ThreadPoolExecutor(1, "long_calls") as long, suppress(EOFError, ConnectionError):
+        while True:
+            call = _receive(line)
+            if call.is_long:
+                long.submit(do, call)
+            else:
+                do(call)
 
 
 def _outcome(do: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
@@ -107,9 +139,10 @@ def _outcome(do: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, E
         return None, error
 
 
-def _receive(line: socket.socket) -> Any:
+def _receive(line: socket.socket) -> _Call:
     (length,) = LENGTH.unpack(_exactly(line, LENGTH.size))
-    return pickle.loads(_exactly(line, length))
+    call: _Call = pickle.loads(_exactly(line, length))
+    return call
 
 
 def _exactly(line: socket.socket, count: int) -> bytes:

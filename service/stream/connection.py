@@ -257,7 +257,7 @@ class _Connection:
         if not opening.keep:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
-            found = await self._streams.ask(session, detectors.write, spool.path, opening.sensor)
+            found = await self._streams.write(session, spool.path, opening.sensor)
             share = self._principal.share
             stored = await self._context.store_threads.run(
                 share, self._store, spool, found, self._upload(opening), is_long=True

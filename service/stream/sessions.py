@@ -7,13 +7,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
 from service.domain.networks import network_of
+from service.formats.reading import Description
 from service.processes.fair_queue import UnboundedFairQueue
 from service.processes.side_process import ProcessEnded, SideProcess
+from service.processes.to_its_end import to_its_end
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
 from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
@@ -29,6 +32,9 @@ RECONNECT_SECONDS = 60.0
 
 FRAMES_AT_ONCE, FRAMES_OF_ONE = 4, 2
 """With the detectors' process, which does one after the other: one is done while the next one of an owner is sent."""
+
+LOGS_AT_ONCE, LOGS_OF_ONE = 2, 1
+"""With that process, too, which writes them beside the frames: it may take a second."""
 
 TAKE_OVER_SECONDS = 5.0
 """s that the connection before may take to let go of a session with which another one goes on."""
@@ -90,7 +96,8 @@ class Streams:
 
     An owner, which is an access key or else an address, has at most ``per_owner`` of them, and what they keep has at
     most ``most_bytes`` together, of which an owner has half of what others leave. Frames of one owner's sessions wait
-    for two of another's at most, however many that has.
+    for two of another's at most, however many that has, and for no log that is written; those of connections that have
+    ended meanwhile count until they are done.
     """
 
     def __init__(self, per_owner: int = 50, most_bytes: int = 512 * 2**20) -> None:
@@ -101,6 +108,7 @@ class Streams:
         self._dropping: set[asyncio.Task[None]] = set()
         self._watchers = Watchers()
         self._turns = UnboundedFairQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
+        self._logs = UnboundedFairQueue(LOGS_AT_ONCE, "written", share=LOGS_OF_ONE)
 
     async def open(
         self,
@@ -231,11 +239,22 @@ class Streams:
                 await asyncio.sleep(pause)
                 pause = min(2.0 * pause, MOST_PAUSE)
 
-    async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
-        """Do something in the worker; raises ``End`` where it died, and all detectors with it."""
+    async def write(self, session: Session, target: Path, sensor: str) -> Description:
+        """Write the log of a session's kept frames, in turns of its own.
+
+        Who is cancelled is so once nobody writes to ``target`` any more. Raises as ``detectors.write`` and ``call`` do.
+        """
+        async with self._logs.turn(session.owner):
+            return await self.call(detectors.write, session.id, target, sensor, is_long=True)
+
+    async def call(self, do: Callable[..., Result], *arguments: Any, is_long: bool = False) -> Result:
+        """Do something in the worker, to its end, whoever is cancelled meanwhile (``SideProcess.call``).
+
+        Raises ``End`` where the worker died, and all detectors with it.
+        """
         process = await self._started()
         try:
-            return await process.call(do, *arguments)
+            return await process.call(do, *arguments, is_long=is_long)
         except (ProcessEnded, KeyError) as error:
             if isinstance(error, ProcessEnded) and process is self._process:  # and not the next one, which others began
                 self._process = None
@@ -251,8 +270,12 @@ class Streams:
     async def _started(self) -> SideProcess:
         async with self._starting:
             if self._process is None:
-                self._process = await SideProcess.start()
+                return await to_its_end(self._start())  # or who goes at once has one process after the other begin
             return self._process
+
+    async def _start(self) -> SideProcess:
+        self._process = await SideProcess.start()
+        return self._process
 
     async def stop(self) -> None:
         """End the worker."""

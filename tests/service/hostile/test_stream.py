@@ -3,6 +3,7 @@
 import asyncio
 import json
 import threading
+import time
 import tracemalloc
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import AbstractContextManager, AsyncExitStack, ExitStack, nullcontext, suppress
@@ -19,6 +20,7 @@ from starlette.websockets import WebSocketDisconnect
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewModel
 from db.repositories import friction_models, jobs, materials
@@ -30,7 +32,7 @@ from service.stream import connection, detectors, errors, sessions
 from service.stream.detectors import PackedFrame
 from service.stream.errors import REFUSED, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.messages import MOST_MATERIALS, Open
-from service.stream.sessions import Streams
+from service.stream.sessions import Session, Streams
 from slipcore.errors import InvalidInput
 
 SIDE = 4
@@ -42,7 +44,7 @@ ZERO = np.zeros((SIDE * SIDE, 3))
 class InProcess:
     """The worker's calls, done here."""
 
-    async def call(self, do: Callable[..., Any], *arguments: Any) -> Any:
+    async def call(self, do: Callable[..., Any], *arguments: Any, is_long: bool = False) -> Any:  # noqa: ARG002
         return do(*arguments)
 
     async def stop(self) -> None:
@@ -517,3 +519,74 @@ def test_streams_that_the_server_s_end_cuts_off_are_no_error_of_it(
             with pytest.raises(ConnectionClosed):
                 stream.recv(timeout=10.0)
     assert faults_in(caplog) == []
+
+
+def test_who_goes_while_its_frames_are_detected_has_no_more_of_them_with_the_process_for_it() -> None:
+    """What it has sent is done all the same, and others would wait for all of that."""
+    nap, times = 0.2, 12
+
+    async def go() -> None:
+        streams = Streams()
+        await streams.call(abs, 0)
+        greedy, honest = (
+            Session(naps, opening(), None, owner)  # type: ignore[arg-type]
+            for naps, owner in ((nap, "greedy"), (0.0, "honest"))
+        )
+        gone = []
+        for _ in range(times):
+            gone.append(asyncio.ensure_future(streams.ask(greedy, time.sleep)))
+            await asyncio.sleep(0.004)
+            gone[-1].cancel()
+        begun = time.monotonic()
+        await streams.ask(honest, time.sleep)
+        waited = time.monotonic() - begun
+        await asyncio.wait(gone)
+        await streams.stop()
+        assert all(each.cancelled() for each in gone)
+        assert waited < 0.5 * times * nap
+
+    run(go)
+
+
+def test_a_log_whose_client_goes_while_it_is_written_leaves_no_file(tmp_path: Path) -> None:
+    """The detectors' process would make the file once more that was removed under it."""
+    blobs, streams = BlobStore(tmp_path), Streams()
+    spool, finish = tmp_path / "spool", {"type": "finish", "store": True}
+    said = first(keep=True), frame(), frame(number=1, time=1.0), finish
+    parts = {"database": NO_DATABASE, "models": ModelCache(), "settings": Settings(), "threads": FairThreads()}
+    context: Any = SimpleNamespace(streams=streams, blobs=blobs, **parts)
+
+    async def go() -> None:
+        socket: Any = Socket(*map(json.dumps, said))
+        await streams.call(abs, 0)
+        busy = asyncio.ensure_future(streams.call(time.sleep, 0.5, is_long=True))
+        with suppress(WebSocketDisconnect):
+            await connection.serve(socket, context, streams, Principal(), lambda *_: {})
+        assert [answer["type"] for answer in socket.answers] == ["opened", "state", "state"]
+        assert busy.done()
+        await streams.stop()
+        assert list(spool.iterdir()) == []
+
+    run(go)
+
+
+def test_who_goes_at_once_leaves_the_process_that_begins_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = []
+
+    async def start() -> InProcess:
+        begun.append(1)
+        await asyncio.sleep(0.05)
+        return InProcess()
+
+    monkeypatch.setattr(sessions.SideProcess, "start", start)
+
+    async def go() -> None:
+        streams = Streams()
+        for _ in range(3):
+            gone = asyncio.ensure_future(streams.call(abs, 0))
+            await asyncio.sleep(0.01)
+            gone.cancel()
+        assert await streams.call(abs, -1) == 1
+        assert len(begun) == 1
+
+    run(go)

@@ -75,3 +75,29 @@ def test_a_process_that_ends_is_told_to_all_who_wait_and_who_come_later() -> Non
             await process.call(os.getpid)
 
     with_process(body)
+
+
+def test_who_is_cancelled_is_so_once_the_process_has_answered_however_often() -> None:
+    async def body(process: SideProcess) -> None:
+        cancelled, other = (asyncio.create_task(process.call(time.sleep, 0.2)) for _ in range(2))
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            cancelled.cancel()
+        assert not cancelled.done()
+        await asyncio.wait({cancelled, other}, return_when=asyncio.FIRST_COMPLETED)
+        assert cancelled.cancelled()
+        await other
+
+    with_process(body)
+
+
+def test_no_call_waits_for_one_that_is_long_and_those_wait_for_each_other() -> None:
+    async def body(process: SideProcess) -> None:
+        long = [asyncio.create_task(process.call(time.sleep, 0.5, is_long=True)) for _ in range(2)]
+        assert await process.call(len, "abc") == 3
+        assert not any(each.done() for each in long)
+        await long[0]
+        assert not long[1].done()
+        await long[1]
+
+    with_process(body)

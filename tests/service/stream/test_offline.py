@@ -26,7 +26,7 @@ OPENING = {"type": "open", "position": [[[0.0, 0.0, 0.0]]], "grid": [1, 1], "ele
 class NoDetectors(Streams):
     """Sessions that nobody detects anything in."""
 
-    async def call(self, *_: Any) -> Any:
+    async def call(self, *_: Any, **_options: bool) -> Any:
         return {}
 
 

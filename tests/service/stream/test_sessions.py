@@ -200,7 +200,7 @@ class Process:
     def __init__(self, error: Exception) -> None:
         self.error = error
 
-    async def call(self, *_: object) -> None:
+    async def call(self, *_: object, **_options: bool) -> None:
         raise self.error
 
 
