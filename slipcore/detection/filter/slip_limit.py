@@ -23,6 +23,13 @@ from slipcore.frames import BoolArray, FloatArray
 COUNT = NUMERICS.slip_limits
 _LEAST_RATIO, _SUREST = NUMERICS.least_ratio, math.exp(NUMERICS.surest_limit)
 """Least ratio of motion to depth, and largest odds of slip, or of stick, by one limit."""
+_BLOCK = 64
+"""A logarithm for so many likelihoods, none of which is below 0.003."""
+ROOMS = 7
+_TAKEN, _COMPRESSION, _ODDS, _GROWTH, _SOONER, _SHOWN, _SLIPS = range(ROOMS)
+"""Rows of numbers of each element: what it has taken up and its compression, m; its odds of stick by the limit that is
+looked at, their growth from one limit to the next and what is left of them for slip that does not show yet; how
+probable slip is by its marker; and by all limits."""
 
 
 @compiled(inline=True)
@@ -34,16 +41,15 @@ def follow_springs(
     deviation: float,
     limit: float,
     after: FloatArray,
-    springs: tuple[FloatArray, FloatArray],
+    rows: FloatArray,
 ) -> tuple[float, float]:
     """Carry on what each element has taken up of the ``motion``, up to ``limit`` times its compression, and fill the
-    size of that and the compression, m, [k] each; sums of compression and motion, m.
+    size of that and the compression, m, in ``rows``; sums of compression and motion, m.
 
     ``surface``: displacement [n, m, 3] in the last frame and now, which elements touch and which did throughout; those
     that have just touched begin anew. No compression counts as less than the ``deviation`` of a marker coordinate, m.
     """
     last, now, contact, stays = surface
-    taken, compression = springs
     n, m = contact.shape
     for i in range(n):
         for j in range(m):
@@ -55,11 +61,11 @@ def follow_springs(
         i, j = places[e]
         after[TOUCH_DEPTH, i, j] = elements[TOUCH_DEPTH, i, j]
         x, y = elements[SPRING_X, i, j] + motion.x[e], elements[SPRING_Y, i, j] + motion.y[e]
-        compression[e] = max(-now[i, j, 2] - elements[TOUCH_DEPTH, i, j], deviation)
-        taken[e] = math.sqrt(x * x + y * y)
-        share = min(1.0, limit * compression[e] / taken[e]) if taken[e] > 0.0 else 1.0
+        taken, compression = math.sqrt(x * x + y * y), max(-now[i, j, 2] - elements[TOUCH_DEPTH, i, j], deviation)
+        share = limit * compression / taken if taken > limit * compression else 1.0
         after[SPRING_X, i, j], after[SPRING_Y, i, j] = share * x, share * y
-        depth += compression[e]
+        rows[_TAKEN, e], rows[_COMPRESSION, e] = taken, compression
+        depth += compression
         moved += math.sqrt(motion.x[e] * motion.x[e] + motion.y[e] * motion.y[e])
     return depth, moved
 
@@ -93,60 +99,90 @@ def step_of_limits(tuning: Tuning) -> float:
 @compiled(inline=True)
 def expect_slip(
     places: NDArray[np.int64],
-    springs: tuple[FloatArray, FloatArray],
     deviation: float,
     weights: FloatArray,
     tuning: Tuning,
     after: FloatArray,
-    likelihoods: FloatArray,
+    rows: FloatArray,
     shown_by: FloatArray,
 ) -> None:
     """Fill ``EXPECTED`` by the log-odds of slip that the limits give each element, and ``shown_by`` [COUNT + 1] by the
-    log-likelihood of what markers show of all, by each limit and, last, if all slip alike; ``likelihoods``: room.
+    log-likelihood of what markers show of all, by each limit and, last, if all slip alike; ``rows``: see ``ROOMS``.
 
     An element has by a limit slipped with the logistic function of the logarithm of what it took up over it, and by
     how uncertain this is; what is shown comes late, by ``slip_limit_lag``.
     """
-    first, step = math.log(tuning.slip_limit_least), step_of_limits(tuning)
-    taken, compression = springs
-    ruled, alike = 1.0 - weights[COUNT], mean_shown(places, after, tuning)
-    shown_by[:] = 0.0
-    likelihoods[:] = 1.0
-    for e in range(len(places)):
+    first, step, count = math.log(tuning.slip_limit_least), step_of_limits(tuning), len(places)
+    width2 = tuning.slip_limit_width * tuning.slip_limit_width
+    alike = 0.0
+    for e in range(count):
         i, j = places[e]
-        ratio, blur = max(taken[e] / compression[e], _LEAST_RATIO), deviation / compression[e]
-        width = math.sqrt(tuning.slip_limit_width * tuning.slip_limit_width + blur * blur)
-        odds, growth = math.exp((first - math.log(ratio)) / width), math.exp(step / width)
-        sooner, shown, expected = math.exp(-tuning.slip_limit_lag / width), shown_slip(after, i, j, tuning), 0.0
-        for k in range(COUNT):
-            slips = 1.0 / (1.0 + min(max(odds, 1.0 / _SUREST), _SUREST))
-            likelihoods[k] *= shown * slips + (1.0 - shown) * (1.0 - slips)
-            expected += weights[k] / (1.0 + min(max(sooner * odds, 1.0 / _SUREST), _SUREST))
-            odds *= growth
-        likelihoods[COUNT] *= shown * alike + (1.0 - shown) * (1.0 - alike)
-        told = math.log(expected / (ruled - expected)) if ruled > 0.0 else 0.0
-        after[EXPECTED, i, j] = ruled * min(max(told, -tuning.slip_limit_odds), tuning.slip_limit_odds)
-        if e % 64 == 63 or e == len(places) - 1:  # a logarithm for many likelihoods, none of which is below 0.003
-            for k in range(COUNT + 1):
-                shown_by[k] += math.log(likelihoods[k])
-                likelihoods[k] = 1.0
+        compression = rows[_COMPRESSION, e]
+        ratio, blur = max(rows[_TAKEN, e] / compression, _LEAST_RATIO), deviation / compression
+        steep = 1.0 / math.sqrt(width2 + blur * blur)
+        rows[_ODDS, e] = math.exp((first - math.log(ratio)) * steep)
+        rows[_GROWTH, e], rows[_SOONER, e] = math.exp(step * steep), math.exp(-tuning.slip_limit_lag * steep)
+        rows[_SHOWN, e], rows[_SLIPS, e] = shown_slip(after[PROBABILITY, i, j], tuning), 0.0
+        alike += rows[_SHOWN, e]
+    alike /= count
+    for k in range(COUNT):
+        shown_by[k] = weigh_limit(rows, count, weights[k])
+    shown_by[COUNT] = weigh_alike(rows[_SHOWN][:count], alike)
+    ruled, most = 1.0 - weights[COUNT], tuning.slip_limit_odds
+    largest = math.exp(most)
+    for e in range(count):
+        i, j = places[e]
+        slips, sticks, told = rows[_SLIPS, e], ruled - rows[_SLIPS, e], 0.0
+        if slips >= largest * sticks:
+            told = most
+        elif sticks >= largest * slips:
+            told = -most
+        else:
+            told = math.log(slips / sticks)
+        after[EXPECTED, i, j] = ruled * told if ruled > 0.0 else 0.0
+
+
+@compiled(fastmath={"reassoc"})
+def weigh_limit(rows: FloatArray, count: int, weight: float) -> float:
+    """Add to the probability of slip of each element what a limit of that ``weight`` gives, and take its odds on to the
+    next limit; log-likelihood of what markers show of all.
+
+    Its loop is over elements beside each other in memory, of which several are then worked out at once.
+    """
+    total = 0.0
+    for start in range(0, count, _BLOCK):
+        end, likelihood = min(start + _BLOCK, count), 1.0
+        odds, growth, sooner = rows[_ODDS][start:end], rows[_GROWTH][start:end], rows[_SOONER][start:end]
+        shown, slips = rows[_SHOWN][start:end], rows[_SLIPS][start:end]
+        for e in range(len(odds)):
+            late = 1.0 + min(max(odds[e], 1.0 / _SUREST), _SUREST)
+            now = 1.0 + min(max(sooner[e] * odds[e], 1.0 / _SUREST), _SUREST)
+            both = 1.0 / (late * now)  # one division for both probabilities
+            likelihood *= (1.0 - shown[e]) + (2.0 * shown[e] - 1.0) * (both * now)
+            slips[e] += weight * (both * late)
+            odds[e] *= growth[e]
+        total += math.log(likelihood)
+    return total
+
+
+@compiled(fastmath={"reassoc"})
+def weigh_alike(shown: FloatArray, alike: float) -> float:
+    """The same if all slip as probably as that."""
+    total = 0.0
+    for start in range(0, len(shown), _BLOCK):
+        block, likelihood = shown[start : start + _BLOCK], 1.0
+        for e in range(len(block)):
+            likelihood *= block[e] * alike + (1.0 - block[e]) * (1.0 - alike)
+        total += math.log(likelihood)
+    return total
 
 
 @compiled
-def shown_slip(after: FloatArray, i: int, j: int, tuning: Tuning) -> float:
+def shown_slip(p: float, tuning: Tuning) -> float:
     """How probable slip of an element is by its marker, with even odds at the threshold, and no surer than believed."""
-    p, odds = after[PROBABILITY, i, j], (1.0 - tuning.threshold) / tuning.threshold
+    odds = (1.0 - tuning.threshold) / tuning.threshold
     shown = p * odds / (1.0 - p + p * odds)
     return float(min(max(shown, 1.0 - tuning.slip_limit_trust), tuning.slip_limit_trust))
-
-
-@compiled
-def mean_shown(places: NDArray[np.int64], after: FloatArray, tuning: Tuning) -> float:
-    """The mean of it."""
-    total = 0.0
-    for e in range(len(places)):
-        total += shown_slip(after, places[e, 0], places[e, 1], tuning)
-    return total / len(places)
 
 
 @compiled
@@ -172,25 +208,25 @@ def step_limits(
     surface: tuple[FloatArray, FloatArray, BoolArray, BoolArray],
     noise: tuple[float, bool, bool],
     tuning: Tuning,
-    room: tuple[FloatArray, FloatArray, FloatArray],
+    room: tuple[FloatArray, FloatArray],
     memory: Memory,
 ) -> None:
     """Follow what elements take up, see ``follow_springs``, and fill what slip that lets expect; learn the limits.
 
     ``noise``: deviation of a marker coordinate, m, whether nothing has moved for so long that all stays as it was, and
     whether measured forces are believed: these say more, and nothing is learnt or expected beside them, nor where
-    elements are hardly pressed in beyond the noise. ``room``: two rows [k], and [2, any].
+    elements are hardly pressed in beyond the noise. ``room``: at least [ROOMS, k], and [2, any].
     """
     deviation, held, measured = noise
     after, common = memory.elements, memory.common
-    size, series = COUNT + 1, room[2]
-    weights, likelihoods, shown_by = series[0, :size], series[0, size : 2 * size], series[1, :size]
+    size, (rows, series) = COUNT + 1, room
+    weights, shown_by = series[0, :size], series[1, :size]
     found = common[LIMITS : LIMITS + size]
-    limit, springs, count = weigh_limits(found, tuning, weights), (room[0], room[1]), len(places)
-    depth, moved = follow_springs(elements, places, motion, surface, deviation, limit, after, springs)
+    limit, count = weigh_limits(found, tuning, weights), len(places)
+    depth, moved = follow_springs(elements, places, motion, surface, deviation, limit, after, rows)
     used = depth > tuning.slip_limit_depth * deviation * count and not measured
     if used and not held:
-        expect_slip(places, springs, deviation, weights, tuning, after, likelihoods, shown_by)
+        expect_slip(places, deviation, weights, tuning, after, rows, shown_by)
         learn_limits(shown_by, min(moved / depth, 1.0), count, tuning, found)
     for e in range(count):
         i, j = places[e]

@@ -143,8 +143,8 @@ def step_elements(
         update_element(elements, after.elements, i, j, seen, increment, tuning)
     sight = last.displacement, frame.displacement, after.contact, surface.stays
     measured = has_force and tuning.force_floor == 0.0  # what is reconstructed from markers says no more than they do
-    rows, noise_now = (deeper, told[1], room.series), (math.sqrt(variance), held, measured)  # rows no longer needed
-    step_limits(elements, places, motion, sight, noise_now, tuning, rows, after)
+    rooms, noise_now = (room.rows, room.series), (math.sqrt(variance), held, measured)  # anchors are done with
+    step_limits(elements, places, motion, sight, noise_now, tuning, rooms, after)
 
 
 @compiled(inline=True)
