@@ -1,5 +1,6 @@
 """Content-addressed files: a blob's name is the SHA-256 of its bytes, and it is there as a whole or not at all."""
 
+import fcntl
 import hashlib
 import math
 import os
@@ -44,14 +45,19 @@ def disk_errors_named() -> Iterator[None]:
 
 
 class Spool:
-    """A file under way into the store: hashed while it is written, gone at the end unless kept."""
+    """A file under way into the store: hashed while it is written, gone at the end unless kept.
+
+    Until then its process holds it, by a lock that ends with the process, however that ends.
+    """
 
     def __init__(self, path: Path, take_in: Callable[[Path, str], None]) -> None:
         self.path = path
         self.size = 0
         self._take_in = take_in
         self._hash = hashlib.sha256()
-        self._file = path.open("xb")
+        self._file = path.open("x+b")
+        with suppress(OSError):  # where the file system has no locks, nobody else gets one either
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # shared, for HDF5 locks what it reads
 
     def write(self, chunk: bytes | bytearray) -> None:
         """Append a chunk; raises ``StorageUnavailable`` on a full or broken disk."""
@@ -163,13 +169,28 @@ class BlobStore:
         with disk_errors_named():
             return Path(mkdtemp(dir=self._spool))
 
+    def under_way(self) -> list[Path]:
+        """The files of ``spool`` and the folders beside them, also those that killed processes have left."""
+        with disk_errors_named():
+            return list(self._spool.iterdir())
+
     def clear_spool(self) -> None:
         """Remove what was under way when its process ended; only for one who works in the folder alone."""
-        for path in self._spool.iterdir():
-            if path.is_dir():  # of a reader
-                shutil.rmtree(path)
-            else:
-                path.unlink(missing_ok=True)
+        for path in self.under_way():
+            _remove(path)
+
+    def remove_unheld(self, path: Path) -> bool:
+        """Remove one of those unless a process holds it as its ``Spool``; whether it did. Nobody holds a folder."""
+        try:
+            if path.is_dir():
+                _remove(path)
+                return True
+            with path.open("r+b") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _remove(path)
+        except OSError:  # held, gone, or where there are no locks
+            return False
+        return True
 
     def put(self, content: bytes) -> str:
         """Store bytes and return their hash."""
@@ -374,6 +395,13 @@ class BlobStore:
 def open_blobs(folder: Path, url: str | None = None, cache_bytes: int = 0) -> BlobStore:
     """The blobs in a folder, or those of the object store at ``url`` with the folder as their cache."""
     return BlobStore(folder, None if url is None else ObjectStore(url), cache_bytes)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():  # of a reader
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _identity(path: Path) -> tuple[int, int] | Path:

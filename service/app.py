@@ -40,6 +40,7 @@ from service.jobs.executors import executor_for_short_jobs, executors
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
+from service.jobs.spool_sweep import SpoolSweep
 from service.jobs.webhook import Webhook
 from service.jobs.worker import StoreConfig
 from service.observability import traces
@@ -188,12 +189,13 @@ def _job_runner(settings: Settings, database: Database) -> JobRunner:
 
 
 class Background(NamedTuple):
-    """What runs beside requests and jobs; all but the watch only where the runner leads."""
+    """What runs beside requests and jobs; all but the watch and the sweep only where the runner leads."""
 
     retention: Retention
     scrub: Scrub
     watch: StoreWatch
     webhook: Webhook
+    sweep: SpoolSweep
 
 
 def _background(settings: Settings, database: Database, blobs: BlobStore, runner: JobRunner) -> Background:
@@ -215,6 +217,7 @@ def _background(settings: Settings, database: Database, blobs: BlobStore, runner
         Scrub(database, blobs, settings.scrub_bytes_per_second, leads),
         StoreWatch(database, blobs, settings.least_free_bytes),
         Webhook(database, settings.webhook_url, settings.webhook_secret, leads),
+        SpoolSweep(blobs),
     )
 
 

@@ -1,5 +1,7 @@
 import hashlib
 import os
+import subprocess
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -211,7 +213,7 @@ def test_a_disk_that_is_full_at_the_last_bytes_leaves_nothing(
         def flush(self) -> None:
             raise OSError(28, "No space left on device")
 
-        close = flush
+        close = fileno = flush
 
     def upload() -> None:
         with blobs.spool() as spool:
@@ -315,3 +317,26 @@ def test_the_files_of_another_store_in_its_place_are_not_taken(tmp_path: Path) -
             act()
     store.store_id = "2" * 32
     store.ping()
+
+
+def test_a_file_under_way_is_removed_once_the_process_that_holds_it_is_gone_and_no_earlier(tmp_path: Path) -> None:
+    blobs = BlobStore(tmp_path)
+    hold = "import sys, time; from pathlib import Path; from db.blobs import BlobStore; "
+    hold += "spool = BlobStore(Path(sys.argv[1])).spool(); print(spool.path, flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", hold, str(tmp_path)], stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None
+        path = Path(holder.stdout.readline().strip())
+        with blobs.spool() as own:
+            assert blobs.under_way() in ([path, own.path], [own.path, path])
+            assert not blobs.remove_unheld(own.path)
+            assert not blobs.remove_unheld(path)
+            own.write(CONTENT)
+            assert own.keep() == SHA256
+        holder.kill()
+        holder.wait()
+    assert blobs.under_way() == [path]
+    assert blobs.remove_unheld(path)
+    assert not blobs.remove_unheld(path)
+    blobs.folder().joinpath("part").write_bytes(CONTENT)
+    assert [blobs.remove_unheld(path) for path in blobs.under_way()] == [True]
+    assert files(tmp_path) == [f"blobs/{SHA256[:2]}/{SHA256}"]
