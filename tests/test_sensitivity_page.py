@@ -42,6 +42,7 @@ ENTRIES = {
         "layers layers_weight layer_misfit layer_evidence layer_stick_share layer_stick_width spring_spread",
         "tried on the tuning scenes; docs/sensors.md says how far F1 changes",
     ),
+    "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (
         "descents free_frames free_motion least_known least_square_arm rank settled still",

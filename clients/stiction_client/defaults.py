@@ -40,3 +40,17 @@ UNKNOWN_FRICTION = 0.5
 
 UNKNOWN_LEVEL = 0.25
 """-, 0 to 2: standard deviation of the friction of such a surface; that of ``estimators.recognise``."""
+
+LOAD_NOISE = 0.02
+"""N a frame, 0 to 1: standard deviation of the load that is expected before frames show it: 2 mN an element, of a
+hundred that touch."""
+
+NOISE_FRAMES = 60.0
+"""-, 10 and more: frames over which the load's noise is averaged, which is then known to a tenth of itself."""
+
+REST_FRAMES = 20.0
+"""-, 5 and more: frames over which a load at rest is averaged: a fifth of one frame's noise is left."""
+
+TAKEN_AWAY = 0.9
+"""-, 0.5 to 1: of the load over force that a contact bore, below which it does not slide, but has less load: what
+slides bears more of its force than what held under more force."""

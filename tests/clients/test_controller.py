@@ -96,7 +96,7 @@ def test_a_known_object_that_tells_no_samples_is_held_with_the_planner_s_force(s
     model = model_of(make_model, 0.45)
     episode = run(PointContact(LIFT, sampled_below=0.0, seed=seed), GraspController.init(SETTINGS, model))
     asked = required_normal_force(model, 1.5, contacts=SETTINGS.contact).normal_force
-    assert episode.modes() == ["hold"]
+    assert set(episode.modes()) == {"hold", "learn"}
     assert episode.plant.slipped == 0.0
     assert episode.normal[-1] == pytest.approx(asked, rel=0.02)  # 10 mN of noise of the load of 1.5 N
 
@@ -612,3 +612,61 @@ def test_the_most_slippery_material_asks_for_a_force_only_while_one_is_to_be_rec
     is_waited_for = waits and mode == "feel"
     assert reasons.count("to be recognised") == (2 if is_waited_for else 0)
     assert ("no stick ratio" in reasons or "friction unknown" in reasons) is (mode == "feel" and not waits)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_model_s_grip_is_relaxed_to_what_the_grasp_has(seed: int, make_model: Make) -> None:
+    """A grasp of more friction than most, of which nothing slips under the force that a model asks for."""
+    model = model_of(make_model, 0.45)
+    episode = run(
+        PointContact(LIFT, friction=0.5, sampled_below=0.36, seed=seed), GraspController.init(SETTINGS, model)
+    )
+    assert "learn" in episode.modes()
+    assert episode.plant.slipped == 0.0
+    asked = required_normal_force(model, 1.5, contacts=SETTINGS.contact).normal_force
+    assert episode.normal[-1] < 1.17 * episode.least < 0.95 * asked
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_slides_unseen_as_its_grip_is_relaxed_is_held_by_the_friction_that_it_shows(
+    seed: int, known: bool, make_model: Make
+) -> None:
+    """Of a detector that misses all slip."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45) if known else None)
+    episode = run(PointContact(LIFT, missed=1.0, sampled_below=0.0, seed=seed), state)
+    assert 0.0 < episode.plant.slipped < 5e-3
+    assert 1.0 < episode.normal[-1] / episode.least < 1.25
+
+
+@pytest.mark.parametrize(("mode", "counts"), [("hold", True), ("learn", False)])
+def test_elements_at_rest_are_no_warning_while_a_grip_is_relaxed(mode: Any, counts: bool, make_model: Make) -> None:
+    state = dataclasses.replace(GraspController.init(SETTINGS, model_of(make_model, 0.45)), mode=mode)
+    resting = SlipSamples(np.array([0.4]), np.array([0.05]), 0.0)
+    assert controller._counts(state, resting, agrees=True) == counts
+
+
+def test_slip_ends_relaxing_and_is_answered_by_more_than_the_model_asks_for(make_model: Make) -> None:
+    state, normal = GraspController.init(SETTINGS, model_of(make_model, 0.45)), 4.0
+    for frame in range(1, 60):
+        ratio = 1.0 if frame < 50 else 0.0
+        state, command = GraspController.step(state, Observation(frame * FRAME, normal, 1.5, 0.0, ratio))
+        normal = 3.0 if frame >= 40 else normal
+        if frame == 45:
+            assert command.mode == "learn"
+    assert command.mode == "hold"
+    assert command.reason == "slip"
+    assert command.normal_force == pytest.approx((1.0 + SETTINGS.reflex_gain) * normal, rel=1e-6)
+    assert state.known is not None
+    assert state.known.learnt
+
+
+def test_a_load_that_is_taken_away_shows_no_less_friction_than_was_borne_before(make_model: Make) -> None:
+    """Taken for sliding or not: a load that comes back meets no grip for next to no friction."""
+    state, normal = GraspController.init(SETTINGS, model_of(make_model, 0.45)), 4.0
+    for frame in range(1, 120):
+        load = 1.5 if frame < 60 else max(1.5 - 0.1 * (frame - 60), 0.3)
+        state, command = GraspController.step(state, Observation(frame * FRAME, normal, load, 0.0, 0.5))
+        normal = command.normal_force
+    assert state.known is not None
+    assert state.known.expected(5.0) > 1.5 / 4.0

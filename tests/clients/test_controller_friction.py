@@ -10,6 +10,7 @@ from stiction_client import Contact, ControlSettings, InvalidArgument
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, error_of_mean, utilisation
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.recognition import GripRecognition
+from stiction_client.defaults import NORMAL_DEVIATIONS
 from stiction_client.quantile import FrictionQuantile
 from tests.service.report.test_material import MODEL
 
@@ -226,3 +227,27 @@ def test_samples_that_say_the_same_without_any_error_refute_nothing() -> None:
     exact = replace(SETTINGS, learned_error=0.0, sample_error=0.0)
     assert not certain.refuted(learned(0.5, 0.5), LoadEstimate(), 2.0, exact)
     assert certain.refuted(learned(0.499, 0.499), LoadEstimate(), 2.0, exact)
+
+
+@pytest.mark.parametrize(("count", "learnt"), [(1, False), (50, True)])
+def test_a_grasp_is_learnt_once_more_samples_would_say_little_more(count: int, learnt: bool) -> None:
+    """Of two frames: their common error is 0.03, and 0.13 that of one element."""
+    settings = replace(SETTINGS, learned_error=0.03, sample_error=0.13)
+    assert KNOWN.sharpen(learned(0.5, 0.5, count=count), 2.0, settings).learnt == learnt
+
+
+def test_a_grasp_of_far_more_friction_than_known_is_not_learnt_by_a_quantile() -> None:
+    assert not KNOWN.sharpen(learned(0.95, 0.95, count=500), 2.0, SETTINGS).learnt
+
+
+def test_what_slip_disproves_is_as_before_its_samples_and_no_more_are_sought() -> None:
+    sharpened = KNOWN.sharpen(learned(0.4, 0.4, count=2), 2.0, SETTINGS)
+    disproved = sharpened.disproved()
+    assert (disproved.sharpened, disproved.shifted, disproved.samples, disproved.learnt) == (1.0, 1.0, 0, True)
+
+
+def test_a_contact_that_slid_has_the_friction_that_it_bore() -> None:
+    slid = KnownFriction.slid(0.4, SETTINGS)
+    assert slid.expected(5.0) == pytest.approx(0.4)
+    assert slid.bounds(5.0)[0] == pytest.approx(0.4 * (1.0 - NORMAL_DEVIATIONS * SETTINGS.learned_error))
+    assert not slid.of_others

@@ -91,3 +91,10 @@ def test_torque_adds_by_its_arm_as_root_of_squares() -> None:
     assert size_of(seen(0.0, 3.0), SETTINGS) == 3.0
     with pytest.raises(InvalidArgument, match=r"torque is 0\.5; allowed: 0 where the contact has no torque_arm"):
         size_of(seen(0.0, 3.0, 0.5), SETTINGS)
+
+
+def test_noise_is_what_changes_beside_the_trend() -> None:
+    load = LoadEstimate(1.0, noise=0.02).step(seen(3.0, 1.04), 0.02, SETTINGS)
+    beside = 0.04 - load.trend * 0.02
+    assert load.noise == pytest.approx(math.sqrt(0.02**2 + (0.5 * beside**2 - 0.02**2) / 60.0))
+    assert load.step(seen(9.0, 1.0), 6.0, SETTINGS).noise == load.noise

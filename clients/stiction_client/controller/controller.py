@@ -9,6 +9,7 @@ from stiction_client.controller.friction import KnownFriction, LearnedFriction, 
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.recognition import UNKNOWN, GripRecognition
 from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
+from stiction_client.controller.relaxation import Relaxation
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import StickRatioEstimate
 from stiction_client.model import FrictionModel
@@ -21,8 +22,9 @@ class ControllerState:
     ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: friction of slipping elements;
     ``contradictions``: frames in a row that speak against ``known``; ``overloaded``: frames in a row with as much load
     as all of the contact can bear by it; ``since``: when ``mode`` began, s;
-    ``rested``: whether a load has come to rest, until which the first touch lasts; ``recognition``: the materials that
-    it may be of; ``material``: which it was taken for, and its ``probability``.
+    ``rested``: whether a load has come to rest, until which the first touch lasts; ``relaxation``: what a
+    grip that is being relaxed bears; ``recognition``: the materials that it may be of; ``material``: which it was
+    taken for, and its ``probability``.
     """
 
     settings: ControlSettings
@@ -37,6 +39,7 @@ class ControllerState:
     contradictions: int = 0
     overloaded: int = 0
     rested: bool = False
+    relaxation: Relaxation = field(default_factory=Relaxation)
     recognition: GripRecognition | None = None
     material: str | None = None
     probability: float = 0.0
@@ -101,7 +104,8 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
-    seen = replace(seen, overloaded=overloaded)
+    relaxation = state.relaxation.step(load, observation.normal, relaxed=state.mode == "learn")
+    seen = replace(seen, overloaded=overloaded, relaxation=relaxation)
     return replace(seen, contradictions=contradictions, rested=state.rested or _settled(seen))
 
 
@@ -129,9 +133,11 @@ def _agrees(
 def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
     """Whether a frame's samples are of a ring that moves, and not of elements that rest, of which noise moves some.
 
-    What rests bears its friction just before all of a contact slips. To a model that is then wrong it is a warning.
+    What rests bears its friction just before all of a contact slips. To a model that is then wrong it is a warning, but
+    not where the grip is relaxed on purpose.
     """
-    return (agrees and _has_model(state)) or samples.moving >= state.settings.moving_share
+    warns = agrees and _has_model(state) and not _relaxed(state)
+    return warns or samples.moving >= state.settings.moving_share
 
 
 def _covers_ring(samples: SlipSamples, observation: Observation, settings: ControlSettings) -> bool:
@@ -149,6 +155,11 @@ def _has_model(state: ControllerState) -> bool:
     return state.known is not None and state.known.of_others
 
 
+def _relaxed(state: ControllerState) -> bool:
+    """Whether a model's grip is being relaxed, to learn what friction this grasp has."""
+    return state.mode == "learn" and _has_model(state)
+
+
 def _contradicts(state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float) -> bool | None:
     """Whether a contact slips under a load that the friction that is known holds; None where a frame says nothing."""
     if state.known is None or normal == 0.0 or math.isnan(sticking.stick_ratio):
@@ -160,9 +171,10 @@ def _contradicts(state: ControllerState, sticking: StickRatioEstimate, normal: f
 def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
     """Whether the load is what next to all of the contact bears, by the mean of its friction.
 
-    A contact that slides bears no more than its friction: how much more is asked of it cannot be measured.
+    A contact that slides bears no more than its friction: how much more is asked of it cannot be measured. A grip that
+    is being relaxed is to show whether a grasp has more than the mean.
     """
-    if state.known is None or normal == 0.0:
+    if state.known is None or normal == 0.0 or _relaxed(state):
         return False
     return size > utilisation(state.settings.reflex_stick_ratio) * state.known.expected(normal) * normal
 
@@ -170,10 +182,13 @@ def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
+    if state.relaxation.slides(state.load, settings):
+        return _enter(_slid(state), "hold")
     if state.known is not None and _refuted(state, state.known, observation.normal):
         return _enter(_forgotten(state), "alarm")
     if state.known is not None:
-        return _enter(_sharpened(state, state.known, observation.normal), "hold")
+        state = _sharpened(state, state.known, observation.normal)
+        return _enter(state, "learn" if _unlearnt(state) and _relaxes(state, observation) else "hold")
     if (state.sticking.slips(settings) and state.load.size > 0.0) or _blind(state):
         return _enter(replace(state, since=state.time, recognition=None), "alarm")
     if state.mode == "alarm" and state.time - state.since < settings.settle_time:
@@ -182,7 +197,23 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
     known = state.known or state.learned.known(settings)
     if known is not None:
         return _enter(replace(state, known=known), "hold")
-    return _enter(state, "learn" if _settled(state) and observation.stick_ratio >= 0.0 else "feel")
+    return _enter(state, "learn" if _relaxes(state, observation) else "feel")
+
+
+def _unlearnt(state: ControllerState) -> bool:
+    """Whether what is known is of other grasps, and samples of this one are worth relaxing for."""
+    return state.known is not None and state.known.of_others and not state.known.learnt
+
+
+def _relaxes(state: ControllerState, observation: Observation) -> bool:
+    """Whether the force may fall until enough slips to be sampled: under a load at rest, where slip can be seen."""
+    return _settled(state) and observation.stick_ratio >= 0.0
+
+
+def _slid(state: ControllerState) -> ControllerState:
+    """With the friction that a contact has which slid as its grip was relaxed, whatever was known before."""
+    known = KnownFriction.slid(state.relaxation.bears, state.settings)
+    return replace(state, known=known, learned=LearnedFriction(), relaxation=Relaxation(), recognition=None)
 
 
 def _forgotten(state: ControllerState) -> ControllerState:
@@ -217,9 +248,15 @@ def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> C
         return replace(state, known=learnt or known)
     if learnt is not None and normal > 0.0 and known.surpassed(state.learned, normal, state.settings):
         return replace(state, known=learnt, material=None, probability=0.0)
-    if state.sticking.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
-        return replace(state, known=replace(known, sharpened=1.0, shifted=1.0, samples=0), learned=LearnedFriction())
+    if _disproves(state, known):
+        return replace(state, known=known.disproved(), learned=LearnedFriction())
     return replace(state, known=known.sharpen(state.learned, normal, state.settings))
+
+
+def _disproves(state: ControllerState, known: KnownFriction) -> bool:
+    """Whether slip speaks against samples that had more friction, or against relaxing the grip any further."""
+    slips = state.sticking.slips(state.settings) and state.load.size > 0.0
+    return slips and (known.sharpened > 1.0 or _relaxed(state))
 
 
 def _enter(state: ControllerState, mode: Mode) -> ControllerState:
@@ -264,7 +301,7 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     growth = 1.0 if slips else state.load.growth(settings)  # in slip, what is measured grows with the grip
     if slips:
         demands.append(_Demand(observation.normal * (1.0 + settings.reflex_gain), "slip"))
-    if state.known is not None:
+    if state.known is not None and not _relaxed(state):
         if growth > 1.0 + settings.steady_share:
             asked = state.sticking.required(state.load.size * growth, settings.feel_stick_ratio, _shown(state))
             demands.append(_Demand(asked, "stick ratio, growing load"))
@@ -279,6 +316,9 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     if state.mode == "learn" and lowest > 0.0:
         friction = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
         demands.append(_Demand(load / friction, "samples of slip"))
+    if state.known is not None:
+        most = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
+        return [each if each.reason == "slip" else _Demand(min(each.force, most), each.reason) for each in demands]
     if among is not None and waits:
         slippery = max(among.least_friction(observation.normal), settings.unknown_friction)
         asked = load / slippery

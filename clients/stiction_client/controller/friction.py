@@ -19,7 +19,8 @@ class KnownFriction:
 
     ``deviations``: standard deviations that it lies below the mean; ``of_others``: it is of other grasps, so
     that samples of this one can sharpen it; ``sharpened``: the quantile of this grasp, by them, over that of any;
-    ``shifted``: likewise its mean; ``samples``: of how many elements these are.
+    ``shifted``: likewise its mean; ``samples``: of how many elements these are; ``learnt``: that more samples would
+    not sharpen it much, or would cost slip.
     """
 
     contact: Contact
@@ -30,6 +31,7 @@ class KnownFriction:
     sharpened: float = 1.0
     shifted: float = 1.0
     samples: int = 0
+    learnt: bool = False
 
     @classmethod
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
@@ -43,6 +45,11 @@ class KnownFriction:
         quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability, touching)
         deviations = -NormalDist().inv_cdf(min(settings.slip_probability, LEAST_CERTAIN))
         return cls(contact, quantile, float(contact.element_force(1.0, area)), deviations, of_others=True)
+
+    @classmethod
+    def slid(cls, friction: float, settings: ControlSettings) -> "KnownFriction":
+        """Of a contact that slid: it bears its friction over all of its elements, but for what is common to all."""
+        return cls.learned(friction * (1.0 - NORMAL_DEVIATIONS * settings.learned_error), friction, settings.contact)
 
     @classmethod
     def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
@@ -115,7 +122,13 @@ class KnownFriction:
         posterior = expected - self.deviations * math.sqrt(weight) * error
         if posterior <= 0.0:
             return self
-        return replace(self, sharpened=posterior / low, shifted=expected / mean, samples=count)
+        enough = settings.sample_error <= settings.learned_error * math.sqrt(count)
+        learnt = self.learnt or (enough and not self.surpassed(learned, force, settings))
+        return replace(self, sharpened=posterior / low, shifted=expected / mean, samples=count, learnt=learnt)
+
+    def disproved(self) -> "KnownFriction":
+        """Without what the samples of this grasp said; no more are sought."""
+        return replace(self, sharpened=1.0, shifted=1.0, samples=0, learnt=True)
 
     def _low_and_mean(self, force: float) -> tuple[float, float]:
         element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))

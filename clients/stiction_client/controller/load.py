@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from stiction_client.controller.records import Observation
 from stiction_client.controller.settings import ControlSettings
+from stiction_client.defaults import LOAD_NOISE, NOISE_FRAMES
 from stiction_client.errors import InvalidArgument
 
 
@@ -12,22 +13,24 @@ from stiction_client.errors import InvalidArgument
 class LoadEstimate:
     """``size`` N of tangential force and torque together, how fast it grows, and since when it is ``steady`` (s).
 
-    ``rate`` N/s: found soon, and noisy; ``trend`` N/s: the same, found later and more exactly.
+    ``rate`` N/s: found soon, and noisy; ``trend`` N/s: the same, found later and more exactly; ``noise`` N: a standard
+    deviation of one frame's ``size``, by what changes beside the trend.
     """
 
     size: float = 0.0
     rate: float = 0.0
     trend: float = 0.0
     steady: float = math.inf
+    noise: float = LOAD_NOISE
 
     def step(self, observation: Observation, elapsed: float, settings: ControlSettings) -> "LoadEstimate":
         """The load after a frame; over a gap its rate is not known, and taken as 0."""
         size = size_of(observation, settings)
         if not elapsed <= settings.dropout_time:
-            return LoadEstimate(size, steady=observation.time)
+            return LoadEstimate(size, steady=observation.time, noise=self.noise)
         rate = _followed(self.rate, size - self.size, elapsed, settings.rate_time)
         trend = _followed(self.trend, size - self.size, elapsed, settings.trend_time)
-        moving = LoadEstimate(size, rate, trend)
+        moving = LoadEstimate(size, rate, trend, noise=_scatter(self.noise, size - self.size - trend * elapsed))
         changes = abs(moving.lead(settings) - size) > settings.steady_share * size or size == 0.0
         return replace(moving, steady=math.inf if changes else min(self.steady, observation.time))
 
@@ -44,6 +47,11 @@ class LoadEstimate:
 def _followed(rate: float, change: float, elapsed: float, time: float) -> float:
     """A rate after a ``change`` of the load, filtered over ``time`` s."""
     return rate + (change - rate * elapsed) / (elapsed + time)
+
+
+def _scatter(noise: float, change: float) -> float:
+    """A standard deviation after a ``change`` between two frames, each of which errs by it."""
+    return math.sqrt(noise**2 + (0.5 * change**2 - noise**2) / NOISE_FRAMES)
 
 
 def size_of(observation: Observation, settings: ControlSettings) -> float:
