@@ -33,12 +33,15 @@ OTHERS_CALIBRATIONS = "others_calibrations"
 """Diagnostic, a sentence: how many of a material's logs another key's calibration corrects than sent them."""
 OTHERS_GELS = "others_gels"
 """Diagnostic, a sentence: how many of a material's logs have forces by a gel that another key described."""
+RECONSTRUCTED_FORCES = "reconstructed_forces"
+"""Diagnostic, a sentence: how many of a material's logs have forces that no sensor measured."""
 NOTES = (
     WEAKENING,
     SAME_GRASPS,
     UNCHECKED,
     OTHERS_CALIBRATIONS,
     OTHERS_GELS,
+    RECONSTRUCTED_FORCES,
     SENSOR_GAIN,
     UNKNOWN_SENSOR,
     ELEMENT_AREAS,

@@ -124,7 +124,7 @@ def fit(
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
-    from service.domain.doubtful_logs import with_doubts
+    from service.domain.doubtful_logs import with_doubts, with_reconstructed
     from service.domain.same_grasp import Grasps, same_grasp
 
     grasps = Grasps()
@@ -146,7 +146,8 @@ def fit(
     seen = [max(of_grasp, key=lambda each: len(each[0])) for of_grasp in copies.values()]
     with shown_progress(f"fitting by {method}"):
         model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
-    model = with_doubts(model, [[finding.name for finding in findings] for _, findings in seen])
+    names = [[finding.name for finding in findings] for _, findings in seen]
+    model = with_reconstructed(with_doubts(model, names), names)
     if json:
         print_json(model_record(model))
     else:
@@ -200,6 +201,8 @@ def export(
     exports.write(recordings, output, target)
     frames = sum(len(recording.log) for recording in recordings)
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
+    if by_displacement := sum(recording.log.has_reconstructed_force for recording in recordings):
+        typer.echo(f"forces of {by_displacement} of {len(logs)} grasp(s) are reconstructed from displacement")
 
 
 def refuse_inputs(output: Path, *inputs: Path | None) -> None:

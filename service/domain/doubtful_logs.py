@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from service.domain.calibrate import CORRECTED_BY_ANOTHER
-from service.domain.reconstruct import BY_ANOTHERS_GEL
+from service.domain.reconstruct import BY_ANOTHERS_GEL, BY_DISPLACEMENT
 from slipcore.checks import AGAINST_FRICTION
-from stiction_client.support import OTHERS_CALIBRATIONS, OTHERS_GELS, UNCHECKED
+from stiction_client.support import OTHERS_CALIBRATIONS, OTHERS_GELS, RECONSTRUCTED_FORCES, UNCHECKED
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -31,6 +31,13 @@ def with_others_gels(model: "FrictionModel", findings: Sequence[Collection[str]]
     """The model with a note among its diagnostics where forces of logs follow from a gel that another key described."""
     by_others = [BY_ANOTHERS_GEL in names for names in findings]
     return _counted(model, OTHERS_GELS, by_others, "has", "have", "forces by a sensor's gel that another key described")
+
+
+def with_reconstructed(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
+    """The model with a note among its diagnostics where forces of logs are reconstructed."""
+    by_displacement = [not BY_DISPLACEMENT.isdisjoint(names) for names in findings]
+    told = "forces reconstructed from displacement, as sure as the description of the sensor's gel"
+    return _counted(model, RECONSTRUCTED_FORCES, by_displacement, "has", "have", told)
 
 
 def with_unchecked(model: "FrictionModel", checked: Sequence[bool]) -> "FrictionModel":

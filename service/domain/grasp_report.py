@@ -9,7 +9,7 @@ from db.records import StoredGraspLog
 from estimators import EstimatorError, FrictionModel, fit
 from service import formats
 from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import with_doubts
+from service.domain.doubtful_logs import with_doubts, with_reconstructed
 from service.domain.stored_results import StoredHistory, decode_history, decode_samples, summarise_history
 from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Fact, Report
@@ -61,7 +61,7 @@ def _fitted(
     if none_because is not None:
         return None, none_because
     try:
-        return with_doubts(fit([samples], method=METHOD), [findings]), None
+        return with_reconstructed(with_doubts(fit([samples], method=METHOD), [findings]), [findings]), None
     except EstimatorError as error:
         return None, str(error)
 

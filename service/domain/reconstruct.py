@@ -10,6 +10,12 @@ if TYPE_CHECKING:
 RECONSTRUCTED = "reconstructed forces"
 """The finding of a log whose forces follow from its sensor's gel."""
 
+NOT_CHECKED = "forces not checked"
+"""That of one whose own metadata say that its forces follow from displacement."""
+
+BY_DISPLACEMENT = frozenset({RECONSTRUCTED, NOT_CHECKED})
+"""Findings of logs whose forces no sensor measured."""
+
 BY_ANOTHERS_GEL = "another's gel"
 """That of one whose sensor's gel was described by another key than sent it, which is no admin's."""
 
@@ -50,9 +56,7 @@ def reconstruction_findings(log: "GraspLog", reconstruction: "Reconstruction | N
         evidence = (
             "by the log's own metadata its forces follow from displacement: zero, frame and range were not checked"
         )
-        return [
-            Finding("forces not checked", evidence, "leave out `force` of the metadata where a sensor measured them")
-        ]
+        return [Finding(NOT_CHECKED, evidence, "leave out `force` of the metadata where a sensor measured them")]
     shares = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "

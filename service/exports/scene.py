@@ -21,7 +21,7 @@ LONGEST = 2.0
 class Arrows:
     """From where to where the arrows go: ``begin`` and ``end`` [t, n, m, 3] m; the longest stands for ``longest``.
 
-    ``what``: tangential force, or displacement where no force is known.
+    ``what``: tangential force, measured or reconstructed, or displacement where no force is known.
     """
 
     begin: FloatArray
@@ -34,9 +34,8 @@ class Arrows:
 def arrows(recording: DetectedLog) -> Arrows:
     """Tangential force of each element or, where none is known, its displacement; on the lattice at rest."""
     log = recording.log
-    what, unit, vectors = (
-        ("displacement", "m", log.displacement) if log.force is None else ("tangential force", "N", log.force)
-    )
+    force = "reconstructed tangential force" if log.has_reconstructed_force else "tangential force"
+    what, unit, vectors = ("displacement", "m", log.displacement) if log.force is None else (force, "N", log.force)
     flat = vectors * [1.0, 1.0, 0.0]
     in_contact = np.where(recording.history.contact, np.linalg.norm(flat, axis=-1), 0.0)
     longest = float(in_contact.max(initial=0.0))

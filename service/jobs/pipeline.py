@@ -28,7 +28,13 @@ from estimators.method_names import SCATTER_METHODS
 from service import formats
 from service.domain.calibrate import corrected, correction_findings
 from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_others_gels, with_unchecked
+from service.domain.doubtful_logs import (
+    with_doubts,
+    with_others_calibrations,
+    with_others_gels,
+    with_reconstructed,
+    with_unchecked,
+)
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import (
@@ -318,7 +324,8 @@ def _fit_by(
     prior_or_none = prior if method in SCATTER_METHODS else None
     model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
     findings = [part.findings for part in parts]
-    model = with_others_gels(with_others_calibrations(with_doubts(model, findings), findings), findings)
+    for noted in (with_doubts, with_others_calibrations, with_others_gels, with_reconstructed):
+        model = noted(model, findings)
     return with_copies(with_unchecked(model, [part.is_checked for part in parts]), parts)
 
 

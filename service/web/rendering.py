@@ -8,7 +8,9 @@ from fastapi import Request
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from db.records import StoredGraspLog
 from service import formatting
+from service.domain.reconstruct import BY_DISPLACEMENT
 from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
 from service.report.wording import record_next
@@ -38,6 +40,12 @@ def on_problem(request: Request, template: str, **given: Any) -> None:
     request.state.on_problem = template, given
 
 
+def has_reconstructed_forces(log: StoredGraspLog) -> bool:
+    """Whether forces of a log that was looked at follow from displacement."""
+    findings = () if log.detection is None else log.detection.findings or ()
+    return any(finding.name in BY_DISPLACEMENT for finding in findings)
+
+
 @cache
 def _environment() -> Environment:
     environment = Environment(
@@ -51,6 +59,7 @@ def _environment() -> Environment:
         environment.filters[filter_.__name__] = filter_
     environment.filters |= {"grouped": formatting.grouped, "at_least": formatting.at_least}
     environment.filters["record_next"] = record_next
+    environment.filters["has_reconstructed_forces"] = has_reconstructed_forces
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
     environment.globals["asset"] = path_of
     return environment

@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel
-from service.domain.doubtful_logs import with_doubts, with_others_calibrations, with_others_gels, with_unchecked
+from service.domain.doubtful_logs import (
+    with_doubts,
+    with_others_calibrations,
+    with_others_gels,
+    with_reconstructed,
+    with_unchecked,
+)
 from stiction_client.support import notes
 
 MODEL = FrictionModel(
@@ -63,3 +69,12 @@ def test_logs_that_were_not_checked_are_counted(checked: list[bool], told: str) 
     (note,) = notes(with_unchecked(MODEL, checked).diagnostics)
     assert note == f"{told} stored before logs were checked as now: what is sent again is looked at"
     assert with_unchecked(MODEL, [True, True]) is MODEL
+
+
+def test_logs_whose_forces_no_sensor_measured_are_counted() -> None:
+    """By the sensor's gel, and by what the log itself says of them."""
+    found = [["reconstructed forces", "no rest"], ["no rest"], ["forces not checked"]]
+    (note,) = notes(with_reconstructed(MODEL, found).diagnostics)
+    told = "forces reconstructed from displacement, as sure as the description of the sensor's gel"
+    assert note == f"2 of 3 logs have {told}"
+    assert with_reconstructed(MODEL, [["no rest"]]) is MODEL

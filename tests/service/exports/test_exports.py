@@ -135,3 +135,14 @@ def test_a_missing_library_is_named_with_what_brings_it(
     monkeypatch.delitem(sys.modules, "service.exports.foxglove", raising=False)
     with pytest.raises(formats.UnsupportedFormat, match=r"pip install 'stiction\[formats\]'"):
         exports.write([recording], tmp_path / "log.mcap", "foxglove")
+
+
+@pytest.mark.parametrize(("metadata", "is_told"), [({}, False), ({"force": "reconstructed"}, True)])
+def test_of_how_many_grasps_forces_are_reconstructed_is_printed(
+    recording: DetectedLog, tmp_path: Path, capsys: pytest.CaptureFixture[str], metadata: dict[str, str], is_told: bool
+) -> None:
+    container.write(replace(recording.log, metadata=metadata), tmp_path / "log.npz")
+    with pytest.raises(SystemExit):
+        main(["export", str(tmp_path / "log.npz"), "-o", str(tmp_path / "dataset")])
+    told = "forces of 1 of 1 grasp(s) are reconstructed from displacement"
+    assert (told in capsys.readouterr().out) is is_told

@@ -1,5 +1,6 @@
 """What every viewer is shown of a log: arrows to scale, resultants, and where patches are."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -73,3 +74,9 @@ def test_patches_are_shown_in_the_frames_in_which_they_are() -> None:
 
 def test_states_have_the_colours_that_are_told_apart() -> None:
     assert scene.COLOURS.tolist() == [[139, 148, 158, 64], [0, 114, 178, 255], [213, 94, 0, 255]]
+
+
+def test_arrows_of_reconstructed_forces_are_called_so() -> None:
+    measured = recorded()
+    told = replace(measured.log, metadata={"force": "reconstructed"})
+    assert scene.arrows(replace(measured, log=told)).what == "reconstructed tangential force"

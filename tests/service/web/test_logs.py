@@ -180,3 +180,20 @@ def test_what_is_not_there_is_told_by_a_page(client: httpx.Client, path: str) ->
     answer = client.get(path, headers=HTML)
     assert answer.status_code == 404
     assert "No such" in answer.text
+
+
+@ON_SQLITE
+def test_a_material_says_which_of_its_logs_have_reconstructed_forces(
+    client: httpx.Client, ramp: GraspLog, upload: Any, wait: Any, fitted: Any, page_of: Callable[[str], Any]
+) -> None:
+    told = replace(ramp, metadata={"force": "reconstructed"})
+    client.post("/v1/materials", json={"name": "by displacement"})
+    accepted = upload(client, encode(told), material="by displacement").json()
+    wait(client, accepted["job"]["id"])
+    note = "1 of 1 log has forces reconstructed from displacement, as sure as the description of the sensor's gel"
+    text = page_of("/materials/by displacement").text
+    assert note in text
+    assert text.count("forces reconstructed") - text.count(note) == 1  # in the row of the log
+    assert client.get("/v1/materials/by displacement/friction", params={"v": 0.0, "fn": 0.1}).json()["notes"] == [note]
+    assert "forces reconstructed" not in page_of(f"/materials/{fitted['material']}").text
+    wait_for_empty_spool(client)
