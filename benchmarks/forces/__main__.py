@@ -25,7 +25,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import get_args
@@ -183,6 +183,7 @@ def score(case: Case, draws: int) -> Score:
     cells = found.kernel_width / np.sqrt(log.element_area)
     touched = found.contact | (true[..., 2] < 0.0)
     everything = np.ones(len(log), dtype=bool)
+    turned = np.abs(found.moment - truth.moment) <= NORMAL_95 * found.moment_deviation
     return Score(
         case,
         STICTION,
@@ -196,6 +197,7 @@ def score(case: Case, draws: int) -> Score:
         found.condition,
         {
             **inside("resultant", found.resultant - truth.total, found.resultant_deviation, everything),
+            MOMENT: (int(turned.sum()), len(turned)),
             **inside("element", found.force - true, found.deviation, touched),
         },
     )
@@ -255,11 +257,12 @@ def percent(values: Iterable[float]) -> str:
 
 
 QUANTITIES = [f"{what}, {axis}" for what in ("resultant", "element") for axis in ("tangential", "normal")]
+MOMENT = "moment about z"
 
 
-def coverage(scores: Iterable[Score]) -> list[str]:
+def coverage(scores: Iterable[Score], names: Sequence[str] = QUANTITIES) -> list[str]:
     """Shares of intervals that hold the truth, by quantity."""
-    held = [np.sum([entry.inside[name] for entry in scores], axis=0) for name in QUANTITIES]
+    held = [np.sum([entry.inside[name] for entry in scores], axis=0) for name in names]
     return [f"{inside / count:.0%}" for inside, count in held]
 
 
@@ -283,13 +286,14 @@ def errors_table(scores: list[Score]) -> str:
 
 def coverage_table(scores: list[Score]) -> str:
     """How many intervals hold the truth, by sensor and noise, contacts together."""
-    columns = ("seen", "gel", "markers", "noise, µm", *QUANTITIES, "frames")
+    quantities = (*QUANTITIES[:2], MOMENT, *QUANTITIES[2:])
+    columns = ("seen", "gel", "markers", "noise, µm", *quantities, "frames")
     groups: dict[tuple[str, str, str, str], list[Score]] = {}
     for entry in scores:
         case = entry.case
         groups.setdefault((case.seen, case.gel, case.lattice, f"{1e6 * case.noise:g}"), []).append(entry)
     rows = [
-        (*key, *coverage(own), sum(entry.inside["resultant, normal"][1] for entry in own))
+        (*key, *coverage(own, quantities), sum(entry.inside["resultant, normal"][1] for entry in own))
         for key, own in groups.items()
     ]  # fmt: skip
     return table(columns, rows)

@@ -118,12 +118,13 @@ LATTICES = {"20 × 20": Lattice((20, 20), 5), "10 × 7": Lattice((10, 7), 10)}
 class Truth:
     """A press without noise: the ``log``, whose forces are true, and the true ``area`` [t] m² of contact.
 
-    ``total`` [t, 3] N, also of what lies beyond the markers' elements.
+    ``total`` [t, 3] N and ``moment`` [t] N m about z, also of what lies beyond the markers' elements.
     """
 
     log: GraspLog
     area: FloatArray
     total: FloatArray
+    moment: FloatArray
 
 
 @lru_cache(maxsize=4)
@@ -178,7 +179,8 @@ def press(
 ) -> Truth:
     """A contact on a gel, frame by frame, as markers without noise show it."""
     columns, rows = lattice.indices()
-    kernel, moved, force, area, total = influence(gel), [], [], [], []
+    kernel, moved, force, area, total, moment = influence(gel), [], [], [], [], []
+    middle_of = CELL * (np.arange(SIDE) - SIDE // 2)
     for step in steps:
         loads = traction(CONTACTS[contact], *step, centre)
         everywhere = oaconvolve(kernel, loads[None], mode="same", axes=(-2, -1)).sum(axis=1)
@@ -187,12 +189,13 @@ def press(
         force.append(_on_elements(loads, lattice))
         area.append(np.count_nonzero(loads[2]) * CELL**2)
         total.append(CELL**2 * loads.sum(axis=(1, 2)))
+        moment.append(CELL**2 * float((middle_of * loads[1] - middle_of[:, None] * loads[0]).sum()))
     outward = np.array([1.0, 1.0, -1.0])
     x, y = (CELL * (index - SIDE // 2) for index in (columns, rows))
     position = np.stack((*np.meshgrid(x, y, indexing="ij"), np.zeros(lattice.shape)), axis=-1)
     displacement, forces = (np.stack(field).transpose(0, 3, 2, 1) * outward for field in (moved, force))
     log = GraspLog(np.arange(len(steps)) / 30.0, position, displacement, lattice.pitch**2, forces)
-    return Truth(log, np.array(area), np.stack(total) * outward)
+    return Truth(log, np.array(area), np.stack(total) * outward, np.array(moment))
 
 
 def _on_elements(loads: FloatArray, lattice: Lattice) -> FloatArray:
@@ -213,11 +216,12 @@ def repeated(truth: Truth, times: int) -> Truth:
     """Each frame so many times, one after the other."""
     log = truth.log
     assert log.force is not None
-    displacement, force, area, total = (
-        np.repeat(field, times, axis=0) for field in (log.displacement, log.force, truth.area, truth.total)
+    displacement, force, area, total, moment = (
+        np.repeat(field, times, axis=0)
+        for field in (log.displacement, log.force, truth.area, truth.total, truth.moment)
     )
     again = replace(log, time=np.arange(len(total)) / 30.0, displacement=displacement, force=force)
-    return Truth(again, area, total)
+    return Truth(again, area, total, moment)
 
 
 def seen(log: GraspLog, noise: float, with_depth: bool, rng: np.random.Generator) -> GraspLog:

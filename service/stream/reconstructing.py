@@ -111,6 +111,8 @@ class Reconstructing:
             "source": "reconstructed",
             "resultant": forces.resultant.tolist(),
             "deviation": forces.resultant_deviation.tolist(),
+            "moment": forces.moment,
+            "moment_deviation": forces.moment_deviation,
             "age": found.age,
             "wait_for": found.wait_for,
             "given": found.given,

@@ -255,7 +255,8 @@ class ForceStream:
 
     def _untouched(self, sensor: SensorResponse, frame: MarkerReading) -> StreamedForces:
         n, m = self._position.shape[:2]
-        forces = FrameForces.unnoticed((n, m), sensor.unnoticed(frame.noise), frame.known)
+        limit, moment = sensor.unnoticed(frame.noise), sensor.unnoticed_moment(frame.noise)
+        forces = FrameForces.unnoticed((n, m), limit, moment, frame.known)
         return StreamedForces(forces, given=bool(frame.known.given.any()))
 
     def _none(self, wait_for: str) -> StreamedForces:

@@ -27,7 +27,8 @@ class Reconstruction:
     """Forces by the object, and how well they are known.
 
     ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``resultant`` [t, 3] N of the
-    whole contact, also of what lies beyond the lattice, with ``resultant_deviation``; ``contact`` [t, n, m];
+    whole contact, also of what lies beyond the lattice, with ``resultant_deviation``, and its ``moment`` [t] N m about
+    the sensor's z, through the origin of its places, with ``moment_deviation``; ``contact`` [t, n, m];
     ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
     is known of the resultant's x, y and z that is from the data, not the prior; ``condition``: largest over smallest
     singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
@@ -43,6 +44,8 @@ class Reconstruction:
     deviation: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
+    moment: FloatArray
+    moment_deviation: FloatArray
     contact: BoolArray
     kernel_width: float
     information: FloatArray
@@ -143,7 +146,8 @@ def _followed(
     touched, strongest = shown.touched(), shown.strongest()
     result = _no_forces(log, shown, known.given, sensor)
     for t in map(int, np.flatnonzero(~touched)):
-        _write_frame(result, t, FrameForces.unnoticed(log.grid, result.unnoticed, known[t]))
+        none = FrameForces.unnoticed(log.grid, result.unnoticed, sensor.unnoticed_moment(shown.noise), known[t])
+        _write_frame(result, t, none)
     if not touched.any():
         return result, lattice
     tracker = Tracker.of(sensor, *recording.frame(strongest), criterion, lattice)
@@ -188,6 +192,8 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, sensor:
         deviation=np.zeros(shape),
         resultant=np.zeros((len(log), 3)),
         resultant_deviation=np.zeros((len(log), 3)),
+        moment=np.zeros(len(log)),
+        moment_deviation=np.zeros(len(log)),
         contact=np.zeros(shape[:3], dtype=bool),
         kernel_width=float("nan"),
         information=np.zeros(3),
@@ -211,6 +217,8 @@ def _normal_alone(result: Reconstruction) -> Reconstruction:
         deviation=result.deviation + unknown,
         resultant=result.resultant * normal,
         resultant_deviation=result.resultant_deviation + unknown,
+        moment=np.zeros_like(result.moment),
+        moment_deviation=np.full_like(result.moment, np.inf),
         information=result.information * normal,
     )
 

@@ -18,13 +18,16 @@ class FrameForces:
     """Forces by the object on one frame's elements, and how well they are known: as of a ``Reconstruction``.
 
     ``force`` [n, m, 3] N, z outward, with its standard ``deviation``; ``resultant`` [3] N, also of what lies beyond the
-    lattice, with ``resultant_deviation``; ``contact`` [n, m].
+    lattice, with ``resultant_deviation``, and its ``moment`` N m about the sensor's z, with ``moment_deviation``;
+    ``contact`` [n, m].
     """
 
     force: FloatArray
     deviation: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
+    moment: float
+    moment_deviation: float
     contact: BoolArray
 
     @property
@@ -36,18 +39,18 @@ class FrameForces:
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
         """Of a frame of which nothing is known yet."""
         force, total = np.zeros((*grid, 3)), np.zeros(3)
-        return cls(force, force, total, total, np.zeros(grid, dtype=bool))
+        return cls(force, force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
 
     @classmethod
-    def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, known: KnownForce) -> "FrameForces":
-        """Of a frame whose markers do not move beyond noise: none, up to the ``limit`` [3] N that they would not show,
-        unless the resultant is ``known``. Where on the elements it acts is not.
+    def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, moment: float, known: KnownForce) -> "FrameForces":
+        """Of a frame whose markers do not move beyond noise: none, up to the ``limit`` [3] N and ``moment`` N m that
+        they would not show, unless the resultant is ``known``. Where on the elements it acts is not.
         """
         share = np.where(known.given, limit**2 / (limit**2 + known.deviation**2), 0.0)
         total = share * np.nan_to_num(known.force) * OUTWARD
         left = np.where(known.given, np.sqrt(share) * known.deviation, limit)
         deviation = np.broadcast_to(limit, (*grid, 3))
-        return cls(np.zeros((*grid, 3)), deviation, total, left, np.zeros(grid, dtype=bool))
+        return cls(np.zeros((*grid, 3)), deviation, total, left, 0.0, moment, np.zeros(grid, dtype=bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +58,8 @@ class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
     ``response`` [m, 3 j] of what is observed and ``elements`` [e, j] N of the j nodes in contact; before any misfit,
-    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant; ``unresolved``: what bilinear
-    tractions leave wrong.
+    ``deviation`` [3, e] N of elements' forces, and ``total`` [4] of the ``wrench`` [4, 3, j], N and N m;
+    ``unresolved``: what bilinear tractions leave wrong.
     """
 
     sensor: SensorResponse
@@ -64,6 +67,7 @@ class Reader:
     response: FloatArray
     elements: FloatArray
     deviation: FloatArray
+    wrench: FloatArray
     total: FloatArray
     unresolved: Unresolved
 
@@ -73,11 +77,21 @@ class Reader:
         support, observation = key.fit.support, key.observation
         response = observation.response[:, :, support].reshape(len(observation.noise), -1)
         elements = sensor.elements[:, support]
-        total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
+        wrench = sensor.wrench()[..., support]
+        total = np.linalg.norm(wrench.reshape(4, -1) @ key.fit.root, axis=1)
         depth_seen = sensor.depth_seen(observation)[elements.any(axis=1)]
         shown = sensor.sees_along_surface and depth_seen.size > 0 and bool(depth_seen.all())
         unresolved = Unresolved.of(sensor, key.fit, shown)
-        return cls(sensor, key, response, elements, key.fit.deviation(elements), total, unresolved)
+        return cls(
+            sensor,
+            key,
+            response,
+            elements,
+            key.fit.deviation(elements),
+            wrench,
+            total,
+            unresolved,
+        )
 
     @property
     def given(self) -> bool:
@@ -91,43 +105,53 @@ class Reader:
         outward = np.array([1.0, 1.0, -1.0])
         traction = self.key.fit.traction(data)
         misfit = self._misfit(traction, data)
-        of_elements, of_resultant = self._deviations(traction, data, misfit)
+        of_elements, of_wrench = self._deviations(traction, data, misfit)
+        wrench = self._wrench(traction)
         force = ((self.elements @ traction.T) * outward).reshape(*grid, 3)
-        resultant = self.sensor.load * traction.sum(axis=1) * outward
         largest = RECONSTRUCTION.element_error * np.abs(force).max()
         by_noise = np.hypot(misfit * self.deviation[2].reshape(grid), largest)
         covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * self.sensor.load
         return FrameForces(
             force,
             np.hypot(of_elements.T.reshape(force.shape), largest),
-            resultant,
-            of_resultant,
+            wrench[:3] * outward,
+            of_wrench[:3],
+            float(wrench[3]),
+            float(of_wrench[3]),
             _touching(-force[..., 2], by_noise) & covered,
         )
 
     def _deviations(self, traction: FloatArray, data: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of elements' forces [3, e] N and of the resultant [3] N: by the data, by what bilinear
-        tractions leave wrong, by how much the bound on pulling changes what the data say, and by what other contacts
-        are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382).
+        """Standard deviations of elements' forces [3, e] N and of the wrench [4], N and N m: by the data, by what
+        bilinear tractions leave wrong, by how much the bound on pulling changes what the data say, and by what other
+        contacts are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382).
         """
         linear = self.key.fit.mean(data)
         bound = traction - linear
-        unresolved, of_resultant = self.unresolved.deviations(traction)
+        unresolved, of_wrench = self.unresolved.deviations(traction)
         of_elements = (misfit * self.deviation) ** 2 + (bound @ self.elements.T) ** 2
         of_elements[:, self.unresolved.near] += unresolved**2
-        total = (misfit * self.total) ** 2 + of_resultant**2 + (self.sensor.load * bound.sum(axis=1)) ** 2
+        total = (misfit * self.total) ** 2 + of_wrench**2 + self._wrench(bound) ** 2
         for probability, fit in self.key.others:
             other = fit.mean(data)
             differs = other @ self.sensor.elements[:, fit.support].T - linear @ self.elements.T
             of_elements += probability * differs**2
-            total += probability * (self.sensor.load * (other.sum(axis=1) - linear.sum(axis=1))) ** 2
+            total += probability * (_wrench(self.sensor.wrench()[..., fit.support], other) - self._wrench(linear)) ** 2
         return np.sqrt(of_elements), np.sqrt(total)
+
+    def _wrench(self, traction: FloatArray) -> FloatArray:
+        return _wrench(self.wrench, traction)
 
     def _misfit(self, traction: FloatArray, data: FloatArray) -> float:
         """Root mean square of the residuals over their noise, at least 1."""
         noise = self.key.observation.noise
         residual = (data - self.response @ traction.ravel()) / noise
         return float(np.sqrt(max(1.0, residual @ residual / max(np.isfinite(noise).sum(), 1))))
+
+
+def _wrench(by_each: FloatArray, traction: FloatArray) -> FloatArray:
+    """The wrench [4] of tractions [3, j], by what each makes of it, [4, 3, j]."""
+    return np.asarray(by_each.reshape(4, -1) @ traction.ravel())
 
 
 def typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:

@@ -22,7 +22,7 @@ class SensorResponse:
     traction of 1 at one node. ``observed_between`` [m + 3, 3, l] and ``elements_between`` [e, l]: the same of tractions
     that are largest midway between nodes. ``motion`` [3] m: by how much, in root mean square, markers move at
     least where the gel bears a ``most`` N of load along each axis, on one element or on all alike. ``shows_pressure``:
-    whether they show where it presses.
+    whether they show where it presses. ``arm`` [2] m: markers' largest distances from the sensor's z along x and y.
     """
 
     nodes: Nodes
@@ -35,6 +35,7 @@ class SensorResponse:
     motion: FloatArray
     most: float
     shows_pressure: bool
+    arm: FloatArray
 
     @classmethod
     def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "SensorResponse":
@@ -52,7 +53,9 @@ class SensorResponse:
         over_between = young * between.over_elements(place)
         least = _least_motion(under, most / load)
         shown = 2 in axes or _shows_pressure(at_nodes[:-3])
-        return cls(nodes, at_nodes, elements, load, axes, midway, over_between, least, most, shown)
+        return cls(
+            nodes, at_nodes, elements, load, axes, midway, over_between, least, most, shown, np.abs(place).max(axis=0)
+        )
 
     def unnoticed(self, noise: float) -> FloatArray:
         """The largest resultant [3] N along each axis that moves markers by no more than their ``noise`` m; at most
@@ -61,6 +64,20 @@ class SensorResponse:
         level = noise * np.sqrt(least_power(len(self.response)))
         seen = self.motion > level
         return self.most * np.where(seen, level / np.where(seen, self.motion, 1.0), 1.0)
+
+    def unnoticed_moment(self, noise: float) -> float:
+        """The moment about the sensor's z, N m, of such resultants at markers' largest x and y."""
+        return float(np.hypot(*(self.unnoticed(noise)[:2] * self.arm[::-1])))
+
+    def wrench(self, between: bool = False) -> FloatArray:
+        """Resultant along x, y and into the gel, N, and moment about the sensor's z, N m, by tractions of 1 at each
+        node, or of those that are largest ``between`` nodes: [4, 3, k].
+        """
+        nodes = self.nodes.between if between else self.nodes
+        x, y = nodes.places().T
+        moment = np.stack((-y, x, np.zeros_like(x)))
+        straight = np.broadcast_to(np.eye(3)[..., None], (3, 3, len(x)))
+        return np.asarray(self.load * np.concatenate((straight, moment[None])))
 
     @property
     def response(self) -> FloatArray:

@@ -22,14 +22,14 @@ from slipcore.frames import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unresolved:
-    """Errors of one fit by tractions [3, c] midway between nodes, squared: of the resultant [3, 3 c] N², and of the
-    ``near`` [f] elements [3, f, 3 c] N²; no others are touched by these. ``corners`` [4, c] of each place: numbers of
-    nodes of the fit, one beyond the last for those that it leaves out.
+    """Errors of one fit by tractions [3, c] midway between nodes, squared: of the ``wrench`` [4, 3 c], N² and (N m)²,
+    and of the ``near`` [f] elements [3, f, 3 c] N²; no others are touched by these. ``corners`` [4, c] of each place:
+    numbers of nodes of the fit, one beyond the last for those that it leaves out.
     """
 
     corners: NDArray[np.intp]
     near: NDArray[np.intp]
-    resultant: FloatArray
+    wrench: FloatArray
     elements: FloatArray
 
     @classmethod
@@ -45,18 +45,20 @@ class Unresolved:
         near = np.flatnonzero(over.any(axis=1))
         response = sensor.observed_between[:, :, places].reshape(len(sensor.observed), -1)
         operator = fit.operator.reshape(3, count, -1)
-        whole = sensor.load * operator.sum(axis=1) @ response
+        whole = np.einsum("iac,acm->im", sensor.wrench()[..., fit.support], operator) @ response
         of_elements = sensor.elements[np.ix_(near, fit.support)] @ operator @ response
         for axis in range(3):
             own = slice(axis * len(places), (axis + 1) * len(places))
-            whole[axis, own] -= sensor.load
+            whole[:, own] -= sensor.wrench(between=True)[:, axis, places]
             of_elements[axis, :, own] -= over[near]
         if all_shown:
             whole *= 0.5  # the most by which a traction between nodes differs from their mean, of their change
         return cls(corners[:, places], near, whole**2, of_elements**2)
 
     def deviations(self, traction: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Standard deviations of near elements' forces [3, f] N and of the resultant [3] N by ``traction`` [3, j]."""
+        """Standard deviations of near elements' forces [3, f] N and of the wrench [4], N and N m, by ``traction``
+        [3, j].
+        """
         padded = np.concatenate((traction, np.zeros((3, 1))), axis=1)
         squared = np.ptp(padded[:, self.corners], axis=1).ravel() ** 2
-        return np.sqrt(self.elements @ squared), np.sqrt(self.resultant @ squared)
+        return np.sqrt(self.elements @ squared), np.sqrt(self.wrench @ squared)

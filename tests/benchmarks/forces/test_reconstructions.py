@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.forces import references as gel_references
 from benchmarks.forces.__main__ import (
+    MOMENT,
     QUANTITIES,
     STICTION,
     Case,
@@ -191,10 +192,10 @@ def test_logs_that_are_cut_are_counted_beside_those_that_are_not() -> None:
 def test_intervals_are_counted_over_contacts_and_apart_by_noise() -> None:
     cases = list(covered())
     assert len({(case.depth_seen, case.gel, case.lattice, case.noise) for case in cases}) * 2 == len(cases)
-    held = dict.fromkeys(QUANTITIES, (3, 4))
+    held = dict.fromkeys((*QUANTITIES, MOMENT), (3, 4))
     own = [Score(case, STICTION, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), inside=held) for case in cases[:3]]
     first, second = coverage_table(own).splitlines()[2:]
-    assert first == "| with z | half-space | 20 × 20 | 0 | 75% | 75% | 75% | 75% | 8 |"
+    assert first == "| with z | half-space | 20 × 20 | 0 | 75% | 75% | 75% | 75% | 75% | 8 |"
     assert second.endswith("| 4 |")
 
 

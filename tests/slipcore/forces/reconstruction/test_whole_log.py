@@ -406,3 +406,20 @@ def test_in_the_plane_of_a_thick_gel_the_contact_is_by_motion(pressed: Pressed, 
     known = found.apply(replace(log, contact=~by_motion))
     np.testing.assert_array_equal(known.contact, ~by_motion)
     assert "contact" not in known.metadata
+
+
+def test_the_moment_is_that_of_the_elements_about_the_frames_z(pressed: Pressed) -> None:
+    """Elsewhere in the frame by as much as the resultant then has an arm."""
+    log = pressed(LATE, noise=1e-6)
+    (x, y), force = np.moveaxis(log.position[..., :2], -1, 0), truth(log)
+    total = (x * force[..., 1] - y * force[..., 0]).sum(axis=(1, 2))
+    found = reconstruct(log, GEL, noise=1e-6)
+    size = 3e-3 * np.linalg.norm(force.sum(axis=(1, 2))[:, :2], axis=1)
+    np.testing.assert_array_less(np.abs(found.moment - total), 0.02 * size)
+    np.testing.assert_array_less(np.abs(found.moment - total), 2.5 * found.moment_deviation)
+    np.testing.assert_array_less(found.moment_deviation, 0.02 * size)
+    away = np.array([0.3, -0.2, 0.0])
+    elsewhere = reconstruct(replace(log, position=log.position + away), GEL, noise=1e-6)
+    armed = away[0] * found.resultant[:, 1] - away[1] * found.resultant[:, 0]
+    np.testing.assert_allclose(elsewhere.moment, found.moment + armed, rtol=1e-6, atol=1e-8)
+    assert (elsewhere.moment_deviation > 10.0 * found.moment_deviation).all()

@@ -58,10 +58,11 @@ def test_an_element_touches_whose_force_is_beyond_noise_and_not_little_beside_ot
 def test_of_a_frame_that_shows_nothing_the_known_force_is_taken_by_its_share_of_the_variance() -> None:
     """Up to 3 N would not be noticed; 10 N to 4 N are known along z, and nothing along x and y."""
     known = KnownForce(np.array([np.nan, np.nan, 10.0]), np.full(3, 4.0))
-    found = FrameForces.unnoticed((2, 1), np.array([1.0, 2.0, 3.0]), known)
+    found = FrameForces.unnoticed((2, 1), np.array([1.0, 2.0, 3.0]), 0.4, known)
     np.testing.assert_allclose(found.resultant, [0.0, 0.0, -10.0 * 9.0 / 25.0])
     np.testing.assert_allclose(found.resultant_deviation, [1.0, 2.0, 3.0 * 4.0 / 5.0])
     np.testing.assert_array_equal(found.deviation, [[[1.0, 2.0, 3.0]]] * 2)
+    assert (found.moment, found.moment_deviation) == (0.0, 0.4)
     assert not found.force.any()
     assert not found.contact.any()
 
@@ -100,7 +101,7 @@ def test_a_marker_in_contact_whose_depth_is_not_seen_leaves_the_contact_less_sur
     disk = np.hypot(*sensor.nodes.places().T) < 2.1e-3
     key = Key(observation, np.zeros(len(noise) + 3), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.1)))
     found, shown = Reader.of(sensor, key).unresolved, Unresolved.of(sensor, key.fit, all_shown=True)
-    np.testing.assert_allclose(found.resultant, (4.0 if wider else 1.0) * shown.resultant, rtol=1e-12)
+    np.testing.assert_allclose(found.wrench, (4.0 if wider else 1.0) * shown.wrench, rtol=1e-12)
 
 
 def test_depth_alone_leaves_a_resultant_as_unsure_as_the_whole_change_between_nodes() -> None:
@@ -109,4 +110,11 @@ def test_depth_alone_leaves_a_resultant_as_unsure_as_the_whole_change_between_no
     disk = np.hypot(*sensor.nodes.places().T) < 2.1e-3
     key = Key(observation, np.zeros(84), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.1)))
     whole = Unresolved.of(sensor, key.fit, all_shown=False)
-    np.testing.assert_allclose(Reader.of(sensor, key).unresolved.resultant, whole.resultant, rtol=1e-12)
+    np.testing.assert_allclose(Reader.of(sensor, key).unresolved.wrench, whole.wrench, rtol=1e-12)
+
+
+def test_nothing_unnoticed_turns_by_more_than_the_largest_arm_of_what_is_unnoticed() -> None:
+    moved = POSITION + np.array([2e-3, -1e-3, 0.0])
+    sensor = SensorResponse.of(moved, PITCH**2, Gel(1e6, 0.49, 5e-3), (0, 1))
+    along_x, along_y, _ = sensor.unnoticed(1e-6)
+    assert sensor.unnoticed_moment(1e-6) == pytest.approx(np.hypot(5e-3 * along_x, 6e-3 * along_y))

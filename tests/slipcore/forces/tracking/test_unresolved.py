@@ -36,13 +36,16 @@ def test_errors_are_those_of_forces_found_from_what_tractions_between_nodes_move
     for axis, place in ((0, [0.5e-3, 0.5e-3]), (2, [0.5e-3, -1.5e-3]), (2, [2.5e-3, 0.5e-3])):
         at = int(np.argmin(np.hypot(*(midway - place).T)))
         traction = found.operator @ seen.observed_between[:, axis, at]
-        resultant = seen.load * traction.reshape(3, -1).sum(axis=1)
-        resultant[axis] -= seen.load
+        x, y = touching.T
+        wrench = seen.load * np.append(traction.reshape(3, -1).sum(axis=1), 0.0)
+        wrench[axis] -= seen.load
+        wrench[3] = seen.load * (np.concatenate((-y, x, 0.0 * x)) @ traction)
+        wrench[3] -= seen.load * (-midway[at, 1], midway[at, 0], 0.0)[axis]
         elements = traction.reshape(3, -1) @ seen.elements[:, found.support].T
         elements[axis] -= seen.elements_between[:, at]
         column = axis * len(beside) + int(np.flatnonzero(beside == at)[0])
-        half = 0.5 * np.abs(resultant)
-        np.testing.assert_allclose(np.sqrt(errors.resultant[:, column]), half, rtol=1e-6, atol=1e-9)
+        half = 0.5 * np.abs(wrench)
+        np.testing.assert_allclose(np.sqrt(errors.wrench[:, column]), half, rtol=1e-6, atol=1e-12)
         np.testing.assert_allclose(
             np.sqrt(errors.elements[:, :, column]), np.abs(elements[:, errors.near]), rtol=1e-6, atol=1e-9
         )
@@ -55,7 +58,7 @@ def test_a_traction_that_is_the_same_everywhere_is_resolved_but_for_the_rim() ->
     flat = np.zeros((3, int(found.support.sum())))
     flat[2] = 0.01
     rim = (errors.corners == flat.shape[1]).any(axis=0)
-    expected = 0.01 * np.sqrt(errors.resultant[2].reshape(3, -1)[2, rim].sum())
+    expected = 0.01 * np.sqrt(errors.wrench[2].reshape(3, -1)[2, rim].sum())
     assert errors.deviations(flat)[1][2] == pytest.approx(expected)
     assert 0 < rim.sum() < rim.size
     assert not errors.deviations(0.0 * flat)[1].any()
