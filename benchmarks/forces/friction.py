@@ -91,7 +91,7 @@ def outcomes(seen: str, noise: float, seed: int) -> Iterator[Outcome]:
         by_forces, by_truth = found.apply(alone), replace(alone, force=log.force, normal=log.normal)
         history = detect_slip(by_forces, lookahead=LOOKAHEAD)
         others = (detect_slip(each, lookahead=LOOKAHEAD) for each in (touching(alone), by_truth))
-        collected = collect_friction(by_forces, history, **found.of_samples)
+        collected = collect_friction(found.for_samples(by_forces), history, **found.of_samples)
         contact = collected.contact
         slid = None if contact is None or contact.is_bound else contact
         yield Outcome(

@@ -39,8 +39,11 @@ class InspectedLog:
         """Friction samples, with the noise of reconstructed forces."""
         from slipcore import collect_samples
 
-        options = {} if self.reconstruction is None else self.reconstruction.of_samples
-        return collect_samples(self.log, self.history, **options)
+        if self.reconstruction is None:
+            return collect_samples(self.log, self.history)
+        return collect_samples(
+            self.reconstruction.for_samples(self.log), self.history, **self.reconstruction.of_samples
+        )
 
     def findings(self) -> "list[Finding]":
         """What makes friction from it doubtful."""

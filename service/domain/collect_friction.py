@@ -21,8 +21,10 @@ def collect(
         return _no_samples(log), _without_forces(log)
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
-    options = {} if reconstruction is None else reconstruction.of_samples
-    found = slipcore.collect_friction(log, history, **options)
+    if reconstruction is None:
+        found = slipcore.collect_friction(log, history)
+    else:
+        found = slipcore.collect_friction(reconstruction.for_samples(log), history, **reconstruction.of_samples)
     if len(found.samples) == 0:
         because = found.elements_left_out or _unsure(log, reconstruction) or _without_samples(log, history)
         return found, "; ".join(filter(None, (because, _bound(found.contact))))

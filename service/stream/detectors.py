@@ -326,6 +326,8 @@ def _plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None
     """Once in a while, let the last frames be looked at."""
     if frame.force is None:
         return
+    if session.forces is not None and session.forces.stream is not None:
+        frame = frame._replace(force=session.forces.alike)
     session.frames = [*session.frames[1 - WINDOW :], frame]
     session.answers = [*session.answers[1 - WINDOW :], state]
     session.until_look -= 1

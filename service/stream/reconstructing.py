@@ -39,7 +39,7 @@ class Reconstructing:
     The first frame decides: with forces in it none are reconstructed, else there is a ``stream`` of them, or it is
     ``refused`` with this reason. Its contacts are sought in turns with those of other ``owner``s. ``noise`` N of normal
     forces on elements in contact, as of the last frame with any; ``deviation`` N of forces in the last frame, by which
-    a detector goes.
+    a detector goes; ``alike``: forces of the last frame as friction samples are collected from them.
     """
 
     gel: Mapping[str, float | None]
@@ -49,6 +49,7 @@ class Reconstructing:
     noise: float = 0.0
     deviation: float = 0.0
     failures: int = 0
+    alike: NDArray[np.float64] | None = None
 
     @property
     def held_bytes(self) -> int:
@@ -105,6 +106,7 @@ class Reconstructing:
         except Exception:  # of a look beside the frames
             return self._without_look(frame, gripper_force, deviation)
         forces = found.forces
+        self.alike = forces.alike
         self.noise, self.deviation = forces.force_noise or self.noise, found.force_deviation
         findings = [*at_end_of_range(found.saturated), *contradicted(self.stream.contradicted)]
         told = {

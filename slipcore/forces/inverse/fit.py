@@ -94,6 +94,14 @@ class TractionFit:
         """Standard deviations [3, e] of linear combinations [e, j] of the tractions along each axis."""
         return np.stack([np.linalg.norm(of @ part, axis=-1) for part in self.root.reshape(3, -1, self.root.shape[1])])
 
+    def averaging(self, response: FloatArray) -> FloatArray:
+        """How true tractions are averaged in those found by data of this ``response`` [m, 3 j]: shear along its own
+        axis (the mean of both), and pressure, [2, j, j].
+        """
+        j = self.prior_root.shape[1]
+        own = [self.operator[part] @ response[:, part] for part in (slice(k * j, (k + 1) * j) for k in range(3))]
+        return np.stack((0.5 * (own[0] + own[1]), own[2]))
+
     def information(self) -> FloatArray:
         """Share [3] of what is known of the resultant along each axis that comes from the data, not the prior."""
         whole = np.ones((1, self.prior_root.shape[1]))

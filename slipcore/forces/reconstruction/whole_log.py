@@ -26,7 +26,8 @@ from slipcore.markers import contact_by_motion
 class Reconstruction:
     """Forces by the object, and how well they are known.
 
-    ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``resultant`` [t, 3] N of the
+    ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``alike``, those of which
+    tangential and normal parts are averaged alike, for their ratio; ``resultant`` [t, 3] N of the
     whole contact, also of what lies beyond the lattice, with ``resultant_deviation``, and its ``moment`` [t] N m about
     the sensor's z, through the origin of its places, with ``moment_deviation``; ``contact`` [t, n, m];
     ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
@@ -42,6 +43,7 @@ class Reconstruction:
 
     force: FloatArray
     deviation: FloatArray
+    alike: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
     moment: FloatArray
@@ -78,6 +80,10 @@ class Reconstruction:
         if contact is None or log.metadata.get("contact") in (BY_MOTION, BY_FORCES):
             contact, told["contact"] = self._contact_of(log)
         return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **told})
+
+    def for_samples(self, log: GraspLog) -> GraspLog:
+        """The log that ``apply`` gave, as friction samples are to be collected from it: with forces averaged alike."""
+        return replace(log, force=self.alike)
 
     def _contact_of(self, log: GraspLog) -> tuple[BoolArray | None, str]:
         """What a detector is told of it, and where it is from."""
@@ -190,6 +196,7 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, sensor:
     return Reconstruction(
         force=np.zeros(shape),
         deviation=np.zeros(shape),
+        alike=np.zeros(shape),
         resultant=np.zeros((len(log), 3)),
         resultant_deviation=np.zeros((len(log), 3)),
         moment=np.zeros(len(log)),
@@ -214,6 +221,7 @@ def _normal_alone(result: Reconstruction) -> Reconstruction:
     return replace(
         result,
         force=result.force * normal,
+        alike=result.alike * normal,
         deviation=result.deviation + unknown,
         resultant=result.resultant * normal,
         resultant_deviation=result.resultant_deviation + unknown,

@@ -17,13 +17,15 @@ from slipcore.frames import BoolArray, FloatArray
 class FrameForces:
     """Forces by the object on one frame's elements, and how well they are known: as of a ``Reconstruction``.
 
-    ``force`` [n, m, 3] N, z outward, with its standard ``deviation``; ``resultant`` [3] N, also of what lies beyond the
+    ``force`` [n, m, 3] N, z outward, with its standard ``deviation``; ``alike`` [n, m, 3] N, the same averaged once
+    more so that tangential and normal parts are averaged alike; ``resultant`` [3] N, also of what lies beyond the
     lattice, with ``resultant_deviation``, and its ``moment`` N m about the sensor's z, with ``moment_deviation``;
     ``contact`` [n, m].
     """
 
     force: FloatArray
     deviation: FloatArray
+    alike: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
     moment: float
@@ -39,7 +41,7 @@ class FrameForces:
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
         """Of a frame of which nothing is known yet."""
         force, total = np.zeros((*grid, 3)), np.zeros(3)
-        return cls(force, force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
+        return cls(force, force, force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
 
     @classmethod
     def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, moment: float, known: KnownForce) -> "FrameForces":
@@ -50,7 +52,8 @@ class FrameForces:
         total = share * np.nan_to_num(known.force) * OUTWARD
         left = np.where(known.given, np.sqrt(share) * known.deviation, limit)
         deviation = np.broadcast_to(limit, (*grid, 3))
-        return cls(np.zeros((*grid, 3)), deviation, total, left, 0.0, moment, np.zeros(grid, dtype=bool))
+        nothing = np.zeros((*grid, 3))
+        return cls(nothing, deviation, nothing, total, left, 0.0, moment, np.zeros(grid, dtype=bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +61,8 @@ class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
     ``response`` [m, 3 j] of what is observed and ``elements`` [e, j] N of the j nodes in contact; before any misfit,
-    ``deviation`` [3, e] N of elements' forces, and ``total`` [4] of the ``wrench`` [4, 3, j], N and N m;
-    ``unresolved``: what bilinear tractions leave wrong.
+    ``deviation`` [3, e] N of elements' forces, and ``total`` [4] of the ``wrench`` [4, 3, j], N and N m; ``averaging``
+    [2, j, j] of shear and of pressure; ``unresolved``: what bilinear tractions leave wrong.
     """
 
     sensor: SensorResponse
@@ -69,6 +72,7 @@ class Reader:
     deviation: FloatArray
     wrench: FloatArray
     total: FloatArray
+    averaging: FloatArray
     unresolved: Unresolved
 
     @classmethod
@@ -90,6 +94,7 @@ class Reader:
             key.fit.deviation(elements),
             wrench,
             total,
+            key.fit.averaging(response),
             unresolved,
         )
 
@@ -114,6 +119,7 @@ class Reader:
         return FrameForces(
             force,
             np.hypot(of_elements.T.reshape(force.shape), largest),
+            (self._averaged_alike(traction) @ self.elements.T).T.reshape(force.shape) * outward,
             wrench[:3] * outward,
             of_wrench[:3],
             float(wrench[3]),
@@ -138,6 +144,15 @@ class Reader:
             of_elements += probability * differs**2
             total += probability * (_wrench(self.sensor.wrench()[..., fit.support], other) - self._wrench(linear)) ** 2
         return np.sqrt(of_elements), np.sqrt(total)
+
+    def _averaged_alike(self, traction: FloatArray) -> FloatArray:
+        """Shear averaged as pressure is, and pressure as shear is, [3, j].
+
+        Each is found averaged by its own kernel already, and over an element of the rim by more of the one than of the
+        other, which their ratio shows. Where all slips with one friction, averaged by both it is that friction.
+        """
+        shear, pressure = self.averaging
+        return np.concatenate((traction[:2] @ pressure.T, traction[2:] @ shear.T))
 
     def _wrench(self, traction: FloatArray) -> FloatArray:
         return _wrench(self.wrench, traction)

@@ -1,5 +1,6 @@
 """Why a log says nothing of friction, in the words that whoever sent it reads."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -97,7 +98,7 @@ def test_a_load_that_was_borne_is_told_beside_the_reason(nothing: Any) -> None:
 def test_reconstructed_forces_may_be_too_unsure(noise: float, is_unsure: bool) -> None:
     """An element's largest force, 1 N, against ten times the noise."""
     of_samples = {"force_to_noise": 10.0}
-    reconstruction = SimpleNamespace(force_noise=noise, of_samples=of_samples)
+    reconstruction = SimpleNamespace(force_noise=noise, of_samples=of_samples, for_samples=lambda log: log)
     told = why(log(), history(), reconstruction)
     assert ("elements' normal forces follow from displacement to" in told) is is_unsure
     if is_unsure:
@@ -105,15 +106,22 @@ def test_reconstructed_forces_may_be_too_unsure(noise: float, is_unsure: bool) -
 
 
 def test_a_log_with_samples_needs_no_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[dict[str, Any]] = []
+    asked, largest = list[dict[str, Any]](), list[float]()
     some = Collected(SimpleNamespace(__len__=1), None, None, None)._replace(samples=np.ones(4))  # type: ignore[arg-type]
 
-    def collect(*_: object, **options: Any) -> Collected:
+    def collect(seen: GraspLog, _: object, **options: Any) -> Collected:
+        assert seen.force is not None
         asked.append(options)
+        largest.append(float(np.abs(seen.force).max()))
         return some
 
     monkeypatch.setattr(slipcore, "collect_friction", collect)
     assert collect_friction.collect(log(), history(), None) == (some, None)
-    unsure: Any = SimpleNamespace(force_noise=9.0, of_samples={"force_to_noise": 10.0})
+    unsure: Any = SimpleNamespace(
+        force_noise=9.0,
+        of_samples={"force_to_noise": 10.0},
+        for_samples=lambda log: replace(log, force=2.0 * log.force),
+    )
     assert collect_friction.collect(log(), history(), unsure) == (some, None)
     assert asked == [{}, {"force_to_noise": 10.0}]
+    assert largest[1] == 2.0 * largest[0]  # of samples, averaged alike

@@ -74,6 +74,7 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
     contradictions = [told for answer in answers if (told := answer["force"]["contradiction"]) is not None]
     assert 0.0 < np.median(contradictions) < 3.0
     assert answers[-1]["command"]["normal_force"] > 0.5
+    np.testing.assert_array_equal(session.frames[-1].force, session.forces.alike)  # samples are of these
     assert session.look is not None
     session.look.result()
     assert np.median(found[-1].friction_coefficient) == pytest.approx(0.4, rel=0.05)

@@ -423,3 +423,12 @@ def test_the_moment_is_that_of_the_elements_about_the_frames_z(pressed: Pressed)
     armed = away[0] * found.resultant[:, 1] - away[1] * found.resultant[:, 0]
     np.testing.assert_allclose(elsewhere.moment, found.moment + armed, rtol=1e-6, atol=1e-8)
     assert (elsewhere.moment_deviation > 10.0 * found.moment_deviation).all()
+
+
+def test_samples_go_by_forces_averaged_alike(pressed: Pressed) -> None:
+    log = pressed(LATE, noise=1e-6)
+    found = reconstruct(log, GEL, noise=1e-6)
+    sampled = found.for_samples(found.apply(log))
+    np.testing.assert_array_equal(truth(sampled), found.alike)
+    assert sampled.has_reconstructed_force
+    assert 0.0 < relative(found.alike, found.force) < 0.1

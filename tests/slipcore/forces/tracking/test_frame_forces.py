@@ -14,6 +14,7 @@ from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
 from slipcore.forces.tracking.unresolved import Unresolved
+from slipcore.frames import FloatArray
 
 PITCH = 1e-3
 LINE = PITCH * (np.arange(9) - 4.0)
@@ -111,6 +112,29 @@ def test_depth_alone_leaves_a_resultant_as_unsure_as_the_whole_change_between_no
     key = Key(observation, np.zeros(84), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.1)))
     whole = Unresolved.of(sensor, key.fit, all_shown=False)
     np.testing.assert_allclose(Reader.of(sensor, key).unresolved.wrench, whole.wrench, rtol=1e-12)
+
+
+def test_forces_averaged_alike_show_the_friction_with_which_all_slips_up_to_the_rim() -> None:
+    """Shear and pressure of one shape, by noise that smooths them unlike each other."""
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49, 5e-3), (0, 1, 2))
+    observation = sensor.observation(np.full(len(sensor.response), 20e-6), KnownForce.of(None, None, 1)[0])
+    radius = np.hypot(*sensor.nodes.places().T) / 3.2e-3
+    touching = radius < 1.0
+    pressure = 0.05 * np.sqrt(1.0 - radius[touching] ** 2)
+    shear = 0.4 * np.multiply.outer([0.6, -0.8], pressure)
+    data = observation.response[:, :, touching].reshape(len(observation.noise), -1) @ np.append(shear, pressure)
+    key = Key(observation, data, fit(observation, sensor.nodes, touching, TractionPrior(usual(), 0.03)))
+    found = Reader.of(sensor, key).read(data, (9, 9))
+
+    rim = found.contact & (np.hypot(POSITION[..., 0], POSITION[..., 1]) > 2.1e-3)
+
+    def friction(force: FloatArray) -> float:
+        return float(np.mean(np.hypot(force[rim, 0], force[rim, 1]) / -force[rim, 2]))
+
+    assert friction(found.force) < 0.4 * 0.97
+    assert friction(found.alike) == pytest.approx(0.4, rel=0.005)
+    total, alike = (np.abs(force[..., 2]).sum() for force in (found.force, found.alike))
+    assert alike == pytest.approx(total, rel=0.05)
 
 
 def test_nothing_unnoticed_turns_by_more_than_the_largest_arm_of_what_is_unnoticed() -> None:
