@@ -474,7 +474,7 @@ def _is_to_ask_again(request: Request, response: httpx.Response) -> bool:
 def _type_of_problem(response: httpx.Response) -> str | None:
     """As the service names it; None of an answer that is none of its problems."""
     try:
-        kind = str(response.json()["type"])
+        kind = str(_json(response)["type"])
     except (*NOT_JSON, KeyError, TypeError):
         return None
     return kind if kind.startswith("/problems/") else None
@@ -495,14 +495,19 @@ def _content(response: httpx.Response) -> Any:
     if response.status_code == httpx.codes.NO_CONTENT:
         return None
     try:
-        return response.json()
+        return _json(response)
     except NOT_JSON as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is not JSON") from error
 
 
+def _json(response: httpx.Response) -> Any:
+    """What it says in JSON, which is UTF-8 between services (RFC 8259); raises one of ``NOT_JSON``."""
+    return json.loads(response.content.decode())
+
+
 def _refuse(response: httpx.Response) -> NoReturn:
     try:
-        problem = response.json()
+        problem = _json(response)
         kind, detail = str(problem["type"]), str(problem.get("detail") or problem.get("title", ""))
     except (*NOT_JSON, KeyError, TypeError, AttributeError) as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is no problem+json") from error

@@ -1,5 +1,6 @@
 """What calls ask of the service and how they wait, without anything that carries it."""
 
+import json
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -235,6 +236,9 @@ def test_a_problem_without_detail_is_told_by_its_title() -> None:
         (answer(b"<html>", 500), "answered 500 with '<html>', which is no problem"),
         (answer(b"<html>"), "answered 200 with '<html>', which is not JSON"),
         (answer(b"x" * 200), f"with {'x' * 80!r}, which is not JSON"),
+        (answer(json.dumps(JOB).encode("utf-16")), "which is not JSON"),
+        (answer(json.dumps(JOB).encode("utf-16-le")), "which is not JSON"),
+        (answer(json.dumps({"type": "/problems/unknown-job"}).encode("utf-16"), 404), "which is no problem"),
         (answer({**JOB, "id": "j2"}), "its id is 'j2', asked 'j1'"),
         (answer({"id": "j1"}), "lacks or garbles"),
         (answer([]), "lacks or garbles"),
