@@ -147,3 +147,22 @@ def test_a_scratch_is_no_row_of_dots() -> None:
     image = draw(lattice(10, 10), noise=0.01)  # in the upper left quarter
     image[300:304, 60:400] -= 80
     assert len(find_dots(image, dark=True).rest) == 100
+
+
+@pytest.mark.parametrize("value", [0, 128, 255])
+def test_a_large_image_without_any_dot_is_refused_before_it_is_blurred(
+    monkeypatch: pytest.MonkeyPatch, value: int
+) -> None:
+    monkeypatch.setattr(marker_tracking, "_blurred", None)
+    blank = np.full((700, 700), value, dtype=np.uint8)
+    blank[::2] += np.uint8(2 if value < 255 else 254)  # rounding of a grey between
+    with pytest.raises(InvalidInput, match="markers is 0 light dots in the first image; allowed: at least 3"):
+        find_dots(blank)
+
+
+def test_a_wide_blur_is_that_of_the_whole_image_in_a_part_of_its_time() -> None:
+    image = np.random.default_rng(1).uniform(0.0, 255.0, (900, 1100)).astype(np.float32)
+    image += np.linspace(0.0, 200.0, 1100, dtype=np.float32)
+    for deviation in (65.0, 150.0):
+        exact = marker_tracking.cv2.GaussianBlur(image, (0, 0), deviation)
+        assert np.abs(marker_tracking._blurred(image, deviation) - exact).max() < 0.5
