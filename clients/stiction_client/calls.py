@@ -302,7 +302,12 @@ def begin_epoch(name: str, reason: str, first_log: str | None) -> Call[Material]
 def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
     """Withdraw a log."""
     request = Request("PUT", f"/v1/grasp-logs/{_part(log_id)}/withdrawal", json={"reason": reason})
-    return _record(lambda record: GraspLogReceipt.from_json(record["grasp_log"]), (yield from _ask(request)))
+    return _record(_withdrawn, (yield from _ask(request)))
+
+
+def _withdrawn(record: Mapping[str, Any]) -> GraspLogReceipt:
+    log, other = GraspLogReceipt.from_json(record["grasp_log"]), record.get("counts_instead")
+    return replace(log, counts_instead=None if other is None else recorded.text("counts_instead", other))
 
 
 Names = set[tuple[str, str]]

@@ -146,7 +146,10 @@ class FrictionClient:
         return self._run(calls.begin_epoch(name, reason, None if first is None else _id(first)))
 
     def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
-        """Let a log count in no fit any more; it is kept, with the reason."""
+        """Let a log count in no fit any more; it is kept, with the reason.
+
+        Where it is a copy that a merge left behind, ``counts_instead`` names the log to withdraw.
+        """
         return self._run(calls.withdraw(_id(log), reason))
 
     def model(self, name: str, method: str = "auto") -> FrictionModel:

@@ -163,7 +163,8 @@ class Withdrawal:
 @dataclass(frozen=True, slots=True)
 class GraspLogReceipt:
     """A grasp log as the service keeps it, with the job that works on it and, once there, the detection; where it was
-    withdrawn, how.
+    withdrawn, how. ``counts_instead``: in the answer to its withdrawal, the id of the log that still counts in its
+    place, where a merge of materials had left this one behind.
     """
 
     id: str
@@ -179,6 +180,7 @@ class GraspLogReceipt:
     job: Job
     detection: Detection | None
     withdrawal: Withdrawal | None = None
+    counts_instead: str | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "GraspLogReceipt":

@@ -54,7 +54,10 @@ def withdraw(
 ) -> None:
     """Take a log out of its material's fits, which are made again without it; the log is kept."""
     with connected(url, key) as client:
-        typer.echo(f"{client.withdraw(log, reason).id} is withdrawn")
+        withdrawn = client.withdraw(log, reason)
+    typer.echo(f"{withdrawn.id} is withdrawn")
+    if withdrawn.counts_instead is not None:
+        typer.echo(f"A merge had left it behind: {withdrawn.counts_instead}, of the same content, still counts")
 
 
 def _row(log: "GraspLogReceipt") -> list[str | None]:

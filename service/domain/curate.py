@@ -156,6 +156,12 @@ def withdraw(
     return log, _follow_up(context, queued)
 
 
+def counts_instead(context: Context, log_id: str) -> str | None:
+    """The log, by its id, that counts in place of a copy that a merge left behind, if there is one."""
+    with context.database.read() as session:
+        return materials_of_logs.counts_instead(session, log_id)
+
+
 def restore(context: Context, log_id: str, principal: Principal = ANONYMOUS) -> tuple[StoredGraspLog, list[Job]]:
     """Put a withdrawn log back into its material's fits, and fit again with it; raises as ``change``."""
     with context.database.write() as session:

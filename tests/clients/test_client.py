@@ -563,6 +563,8 @@ def test_materials_are_renamed_and_merged_and_logs_withdrawn(
     server = service({"grasp_log": answers.grasp_log, "jobs": []})
     assert ask(server, "withdraw", answers.grasp_log["id"], "mislabelled").id == answers.grasp_log["id"]
     assert json.loads(server.requests[0].content) == {"reason": "mislabelled"}
+    server = service({"grasp_log": answers.grasp_log, "jobs": [], "counts_instead": "7f"})
+    assert ask(server, "withdraw", answers.grasp_log["id"], "mislabelled").counts_instead == "7f"
 
 
 def test_a_sensor_is_described_and_calibrated(ask: Ask, service: Service) -> None:

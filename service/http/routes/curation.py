@@ -4,11 +4,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from db.records import Material
+from db.records import Job, Material, StoredGraspLog
 from service.domain import curate
 from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.conditional import IfMatch, require_match
+from service.http.context import ServerContext
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import (
@@ -138,8 +139,7 @@ def withdraw_grasp_log(
 
     Until then those models are marked as outdated; where no samples are left, the material has none.
     """
-    log, jobs = curate.withdraw(context, id, withdrawal.reason, principal)
-    return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
+    return _withdrawn(context, *curate.withdraw(context, id, withdrawal.reason, principal))
 
 
 @router.delete(
@@ -151,5 +151,9 @@ def withdraw_grasp_log(
 )
 def restore_grasp_log(context: CurrentContext, id: str, principal: CurrentPrincipal) -> WithdrawnOut:  # noqa: A002
     """The log counts again, and its material's models are fitted again with it."""
-    log, jobs = curate.restore(context, id, principal)
-    return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
+    return _withdrawn(context, *curate.restore(context, id, principal))
+
+
+def _withdrawn(context: ServerContext, log: StoredGraspLog, jobs: list[Job]) -> WithdrawnOut:
+    other = curate.counts_instead(context, log.id)
+    return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs], counts_instead=other)

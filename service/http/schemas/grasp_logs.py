@@ -228,10 +228,21 @@ class GraspLogsOut(BaseModel):
 class WithdrawnOut(BaseModel):
     """A log after its withdrawal or its return, and the fits that follow from it."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"grasp_log": GRASP_LOG_EXAMPLE, "jobs": [JOB_EXAMPLE]}]})
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"grasp_log": GRASP_LOG_EXAMPLE, "jobs": [JOB_EXAMPLE], "counts_instead": None}]
+        }
+    )
 
     grasp_log: GraspLogOut
     jobs: list[JobOut]
+    counts_instead: Annotated[
+        str | None,
+        Field(
+            description="Where a merge left this log behind, which counts in no fit either way: the id of the log of "
+            "the same content that counts; null of any other log"
+        ),
+    ]
 
 
 class UploadQuery(BaseModel):

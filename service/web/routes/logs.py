@@ -7,6 +7,7 @@ from fastapi import APIRouter, Request, Response
 from db.records import Detection, StoredGraspLog
 from db.repositories import grasp_logs
 from service.domain.context import Context
+from service.domain.curate import counts_instead
 from service.domain.errors import ResultsNotReady
 from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
@@ -26,7 +27,7 @@ def show_log(context: CurrentContext, request: Request, id: str) -> Response:  #
     """State, findings and player of a log; raises ``NotFound``."""
     log = _find(context, id)
     is_kept = log.detection is not None and context.blobs.has(log.detection.history_blob)
-    return render(request, "log.html", log=log, is_kept=is_kept)
+    return render(request, "log.html", log=log, is_kept=is_kept, other=counts_instead(context, id))
 
 
 @router.get("/logs/{id}/frames", dependencies=[READ, LONG_ANSWER])

@@ -525,8 +525,7 @@ def test_a_log_that_is_looked_at_again_gives_its_material_its_next_models(shop: 
 
 
 def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_now(shop: Shop) -> None:
-    for name, number in (("paper", 0), ("papre", 0)):
-        left_behind = shop.ingest(name, number)
+    counting, left_behind = (shop.ingest(name, 0) for name in ("paper", "papre"))
     with shop.database.write() as session:
         of_both = [materials.find_id(session, name) for name in ("paper", "papre")]
         for material_id, owner in zip(of_both, ("group:new", "group:old"), strict=True):
@@ -539,10 +538,14 @@ def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_
         curate.withdraw(shop.context, left_behind, "mine", old)
     log, queued = curate.withdraw(shop.context, left_behind, "wet", new)
     assert (log.withdrawal is not None, queued) == (True, [])
+    assert curate.counts_instead(shop.context, left_behind) == counting
+    assert curate.counts_instead(shop.context, counting) is None
     assert curate.restore(shop.context, left_behind, new)[1] == []
     assert shop.model("paper") == before
     with shop.database.read() as session:
         assert friction_models.current_methods(session, [of_both[1]]) == []
+    curate.withdraw(shop.context, counting, "wet", new)
+    assert curate.counts_instead(shop.context, left_behind) is None
 
 
 def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:

@@ -81,6 +81,7 @@ def test_a_log_is_withdrawn_and_the_model_follows(
     path = f"/v1/grasp-logs/{logs[0]['id']}"
     answer = client.put(f"{path}/withdrawal", json={"reason": "wet"}).json()
     assert answer["grasp_log"]["withdrawal"]["reason"] == "wet"
+    assert answer["counts_instead"] is None
     assert client.get(path).json()["withdrawal"] == answer["grasp_log"]["withdrawal"]
     assert [wait(client, job["id"])["status"] for job in answer["jobs"]] == ["done", "done"]  # by each of its methods
     found = client.get(f"/v1/materials/{material}").json()
@@ -107,3 +108,17 @@ def test_an_epoch_begins_and_the_model_follows(
     first = client.get(f"/v1/grasp-logs/{logs[0]['id']}").json()
     assert first["withdrawal"]["reason"] == "coated"
     assert client.get(f"/v1/materials/{material}").json()["models"]["ols"]["n"] == first["detection"]["samples"]
+
+
+def test_whoever_withdraws_a_copy_that_a_merge_left_behind_is_told_which_log_counts(
+    client: httpx.Client, content: bytes, upload: Upload
+) -> None:
+    for name in ("glass", "glas"):
+        client.post("/v1/materials", json={"name": name}).raise_for_status()
+    counting, left_behind = (upload(client, content, material=name).json()["id"] for name in ("glass", "glas"))
+    client.post("/v1/materials/glass/merges", json={"source": "glas"}).raise_for_status()
+    path = f"/v1/grasp-logs/{left_behind}/withdrawal"
+    assert client.put(path, json={"reason": "wet"}).json()["counts_instead"] == counting
+    assert client.delete(path).json()["counts_instead"] == counting
+    assert f'href="/logs/{counting}"' in client.get(f"/logs/{left_behind}").text
+    assert "left this log behind" not in client.get(f"/logs/{counting}").text
