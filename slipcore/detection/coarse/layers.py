@@ -9,13 +9,13 @@ both the forces of elements and what share of each still sticks follow from the 
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from slipcore.compilation import compiled
 from slipcore.defaults import NUMERICS, CoarseOptions
-from slipcore.detection.forces_only.method import frictions, prior
+from slipcore.detection.forces_only.tuning import frictions, prior
 from slipcore.frames import FloatArray
 
 _LEAST_FORCE, _LEAST_SPREAD = NUMERICS.least_element_force, NUMERICS.least_spread
@@ -26,7 +26,7 @@ REACHED, SPACING, NORMAL, X, Y, TURN, LOADS = range(7)
 
 
 class Layers(NamedTuple):
-    """What is remembered of k elements at g friction coefficients; never written to.
+    """What is remembered of k elements at g friction coefficients.
 
     ``load`` [6]: how many levels the normal force has reached, their spacing, N, and the sums of forces when they were
     last looked at, N. ``level`` [levels + 1, k]: normal forces, N, of elements when it was at each. ``traction``
@@ -69,21 +69,21 @@ class SummedLoad(NamedTuple):
 
 
 class Believed(NamedTuple):
-    """Friction coefficients [g] that are considered, their log weights [g] beforehand, and options as numbers: see
-    ``layer_options``.
-    """
+    """Friction coefficients [g] that are considered, their log weights [g] beforehand, and options as numbers."""
 
     friction: FloatArray
     prior: FloatArray
     options: FloatArray
 
 
-LEAST_CHANGE, DEVIATIONS, MISFIT, EVIDENCE, STICK_SHARE, WIDTH, SPREAD, MOST = range(8)
+(
+    LEAST_CHANGE, DEVIATIONS, MISFIT, EVIDENCE, STICK_SHARE, WIDTH, SPREAD, MOST, FILTER_WEIGHT, LAYERS_WEIGHT,
+) = range(10)  # fmt: skip
 """Rows of ``Believed.options``."""
 
 
 def believed(options: CoarseOptions) -> Believed:
-    """What ``look_at_layers`` takes of the options."""
+    """What kernels take of the options."""
     numbers = (
         options.least_load_change,
         options.load_deviations,
@@ -93,6 +93,8 @@ def believed(options: CoarseOptions) -> Believed:
         options.layer_stick_width,
         options.spring_spread,
         options.largest_sum,
+        options.filter_weight,
+        options.layers_weight,
     )
     return Believed(frictions(options), prior(options), np.array(numbers))
 
@@ -103,18 +105,9 @@ def no_layers(elements: int, options: CoarseOptions) -> Layers:
     return Layers(np.zeros(LOADS), level, traction, np.zeros(elements), np.zeros(elements))
 
 
-def follow_layers(layers: Layers, seen: PressedElements, considered: Believed) -> Layers:
-    """The layers after a frame, looked at anew once the load has changed by more than noise."""
-    after = Layers(*(array.copy() for array in layers))
-    plain: list[Any] = [tuple(seen), tuple(after), tuple(considered)]  # numba is slow at named tuples from Python
-    look_at_layers(*plain)
-    return after
-
-
 @compiled
-def look_at_layers(seen: PressedElements, layers: Layers, considered: Believed) -> None:
-    """Write to what is remembered; what it is given may be plain tuples of the same entries."""
-    frame, kept, known = PressedElements(*seen), Layers(*layers), Believed(*considered)
+def look_at_layers(frame: PressedElements, kept: Layers, known: Believed) -> None:
+    """Look at the layers anew once the load has changed by more than noise; writes to what is ``kept``."""
     options = known.options
     now = sums(frame.place, frame.normal, frame.sideways)
     if now.normal <= _LEAST_FORCE:

@@ -7,16 +7,18 @@ from how the contact has grown (``layers``). Log-odds of all three are added.
 """
 
 from functools import cache, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import expit, logit
+from scipy.special import expit
 
 from slipcore.defaults import CoarseOptions, FilterOptions
-from slipcore.detection.coarse.layers import Believed, Layers, PressedElements, believed, follow_layers, no_layers
+from slipcore.detection.coarse.joining import Evidence, join
+from slipcore.detection.coarse.layers import Believed, Layers, believed, no_layers
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.forces_only import method as by_force
+from slipcore.detection.forces_only.step import ForcesState
 from slipcore.detection.shared.contact import ContactThreshold
 from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.lasting_noise import start_noise
@@ -32,14 +34,13 @@ from slipcore.detection.shared.records import (
     read_only,
     unwritten,
 )
-from slipcore.frames import FloatArray
 from slipcore.surface.strain import Lattice
 
 
 class CoarseState(NamedTuple):
     """What each method remembers, the contact's layers, and the last frame, as the filter sees it."""
 
-    forces: by_force.ForcesState
+    forces: ForcesState
     layers: Layers
     memory: Memory
     frame: FrameArrays
@@ -73,39 +74,32 @@ def step(
     velocity = np.empty((*seen.contact.shape, 2))
     arguments = _sensor(lattice, options), last, frame, state.memory, after
     by_place.METHOD.run(*map(tuple, arguments), velocity)  # as in ``detector.step``, lest another kernel is compiled
-    odds, layers = _log_odds(after.probability, options), state.layers
-    if seen.force.size:
-        layers = _follow_layers(state.layers, forces, lattice, seen, options)
-        odds = _log_odds(decision.probability, options) + options.filter_weight * odds
-        odds += options.layers_weight * np.where(seen.stays, layers.odds.reshape(odds.shape), 0.0)
-    return CoarseState(forces, layers, after, frame), Decision(odds > 0.0, expit(odds))
-
-
-def _follow_layers(
-    layers: Layers, forces: by_force.ForcesState, lattice: Lattice, seen: ObservedFrame, options: CoarseOptions
-) -> Layers:
-    touching = seen.contact.ravel()
+    if not seen.force.size:
+        least = expit(-options.largest_sum)
+        probability = np.clip(after.probability, least, 1.0 - least)
+        return CoarseState(forces, state.layers, after, frame), Decision(probability > 0.5, probability)
+    layers, joined = Layers._make(map(np.empty_like, state.layers)), Decision._make(map(np.empty_like, decision))
     gain = low_pass(seen.interval, options.force_smoothing)
-    noise = 0.0 if np.isnan(seen.force_noise) else seen.force_noise * np.sqrt(gain / (2.0 - gain))
-    frame = PressedElements(
-        np.ascontiguousarray(lattice.position[..., :2]).reshape(-1, 2),
-        np.where(touching, forces.normal.ravel(), 0.0),
-        np.where(touching[:, None], forces.tangential[..., :2].reshape(-1, 2), 0.0),
-        -(seen.displacement * seen.normal).sum(axis=-1).ravel(),
-        float(noise),
+    evidence = Evidence(
+        read_only(lattice.position),
+        read_only(seen.displacement),
+        frame.normal,
+        frame.contact,
+        seen.stays,
+        forces.normal,
+        forces.tangential,
+        0.0 if np.isnan(seen.force_noise) else float(seen.force_noise * np.sqrt(gain / (2.0 - gain))),
+        decision.probability,
+        after.probability,
     )
-    return follow_layers(layers, frame, _believed(options))
+    plain: list[Any] = [tuple(part) for part in (evidence, state.layers, _believed(options), layers, joined)]
+    join(*plain)  # numba is slow at named tuples from Python
+    return CoarseState(forces, layers, after, frame), joined
 
 
 @cache
 def _believed(options: CoarseOptions) -> Believed:
     return believed(options)
-
-
-def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
-    least = expit(-options.largest_sum)
-    odds: FloatArray = logit(np.clip(probability, least, 1.0 - least))
-    return odds
 
 
 @lru_cache(maxsize=16)

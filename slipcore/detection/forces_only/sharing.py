@@ -1,13 +1,16 @@
 """How elements share a change of the load: sticking ones take their part and more, slipping ones ever less."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.defaults import NUMERICS, ForcesOnlyOptions
+from slipcore.compilation import compiled
+from slipcore.defaults import NUMERICS
+from slipcore.detection.forces_only.tuning import ForcesTuning
 from slipcore.frames import BoolArray, FloatArray
 
-_LEAST_FORCE = NUMERICS.least_element_force
+_LEAST_FORCE, _LEAST_SPREAD = NUMERICS.least_element_force, NUMERICS.least_spread
 
 
 class Loads(NamedTuple):
@@ -16,38 +19,6 @@ class Loads(NamedTuple):
     place: FloatArray
     normal: FloatArray
     tangential: FloatArray
-
-    @property
-    def ratio(self) -> FloatArray:
-        """Of tangential to normal force, [k]."""
-        size: FloatArray = np.linalg.norm(self.tangential, axis=-1)
-        return size / np.maximum(self.normal, _LEAST_FORCE)
-
-    @property
-    def evenly(self) -> FloatArray:
-        """Each element's vector of force over normal force, [k, 3], if the load were shared by the normal force.
-
-        With F_N = Σp, centre c = Σp x/F_N and arms r = x − c: q + ω ẑ × r for q = Σf/F_N and ω = Σ(r × f)/Σp r².
-        """
-        arm, polar = self._arms()
-        total = self.normal.sum()
-        turn = (arm[:, 0] * self.tangential[:, 1] - arm[:, 1] * self.tangential[:, 0]).sum() / polar
-        even: FloatArray = np.tile(self.tangential.sum(axis=0) / total, (len(self.normal), 1))
-        even[:, 0] -= turn * arm[:, 1]
-        even[:, 1] += turn * arm[:, 0]
-        return even
-
-    def sideways(self, change: FloatArray) -> float:
-        """Size of a ``change`` of the tangential forces [k, 3] as a whole, N: of its sum, and of its moment over the
-        radius of gyration.
-        """
-        arm, polar = self._arms()
-        moment = (arm[:, 0] * change[:, 1] - arm[:, 1] * change[:, 0]).sum()
-        return float(np.hypot(np.linalg.norm(change.sum(axis=0)), moment / np.sqrt(polar / self.normal.sum())))
-
-    def _arms(self) -> tuple[FloatArray, float]:
-        arm = self.place - (self.normal[:, None] * self.place).sum(axis=0) / self.normal.sum()
-        return arm, float((self.normal[:, None] * arm**2).sum()) + NUMERICS.least_spread
 
 
 class Sharing(NamedTuple):
@@ -65,48 +36,135 @@ class Sharing(NamedTuple):
     falls: BoolArray
 
 
-def compare(before: Loads, now: Loads, noise: float, options: ForcesOnlyOptions) -> Sharing:
+@compiled
+def ratios(loads: Loads) -> FloatArray:
+    """Of tangential to normal force, [k]."""
+    ratio = np.empty(len(loads.normal))
+    for e in range(len(ratio)):
+        ratio[e] = length(loads.tangential[e]) / max(loads.normal[e], _LEAST_FORCE)
+    return ratio
+
+
+@compiled
+def length(vector: FloatArray) -> float:
+    """Of a vector [3]."""
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@compiled
+def arms(loads: Loads) -> tuple[FloatArray, float]:
+    """Places [k, 2] m from the pressure centre, and the sum of normal force times their squares, N m²."""
+    arm, total, polar = loads.place.copy(), loads.normal.sum(), 0.0
+    for a in range(2):
+        centre = (loads.normal * loads.place[:, a]).sum() / total
+        for e in range(len(arm)):
+            arm[e, a] -= centre
+            polar += loads.normal[e] * arm[e, a] * arm[e, a]
+    return arm, polar + _LEAST_SPREAD
+
+
+@compiled
+def summed(arm: FloatArray, force: FloatArray) -> tuple[float, float, float, float]:
+    """Sum of forces [k, 3], and of their moments about the normal."""
+    x = y = z = moment = 0.0
+    for e in range(len(arm)):
+        x, y, z = x + force[e, 0], y + force[e, 1], z + force[e, 2]
+        moment += arm[e, 0] * force[e, 1] - arm[e, 1] * force[e, 0]
+    return x, y, z, moment
+
+
+@compiled
+def evenly(loads: Loads) -> FloatArray:
+    """Each element's vector of force over normal force, [k, 3], if the load were shared by the normal force.
+
+    With F_N = Σp, centre c = Σp x/F_N and arms r = x − c: q + ω ẑ × r for q = Σf/F_N and ω = Σ(r × f)/Σp r².
+    """
+    arm, polar = arms(loads)
+    x, y, z, moment = summed(arm, loads.tangential)
+    total, turn, even = loads.normal.sum(), moment / polar, np.empty((len(arm), 3))
+    for e in range(len(arm)):
+        even[e, 0], even[e, 1], even[e, 2] = x / total - turn * arm[e, 1], y / total + turn * arm[e, 0], z / total
+    return even
+
+
+@compiled
+def sideways(before: Loads, now: Loads) -> float:
+    """Size of the change of the tangential forces as a whole, N: of its sum, and of its moment over the radius of
+    gyration.
+    """
+    arm, polar = arms(now)
+    x, y, z, moment = summed(arm, now.tangential)
+    x0, y0, z0, moment0 = summed(arm, before.tangential)
+    x, y, z, moment = x - x0, y - y0, z - z0, moment - moment0
+    return math.sqrt(x * x + y * y + z * z + moment * moment * now.normal.sum() / polar)
+
+
+@compiled
+def compare(before: Loads, now: Loads, noise: float, tuning: ForcesTuning) -> Sharing:
     """How elements shared the change from ``before`` to ``now``; ``noise`` of one component of force, N."""
-    ratio, even = now.ratio, now.evenly
-    along = now.tangential / np.maximum(np.linalg.norm(now.tangential, axis=-1), _LEAST_FORCE)[:, None]
-    expected = ((even - before.evenly) * along).sum(axis=-1)
-    level = np.maximum((even * along).sum(axis=-1), options.least_change)
-    share = np.clip(ratio / level, 1.0 / options.largest_share, options.largest_share)
-    deviation = noise * np.sqrt(1.0 + ratio**2) / np.maximum(now.normal, _LEAST_FORCE)
-    most = np.maximum(np.abs(expected) * share, options.least_change)
-    change = ratio - before.ratio
-    return Sharing(ratio, deviation, change / most, np.sqrt(2.0) * deviation / most, expected, change < 0.0)
+    ratio, last, even, even_before = ratios(now), ratios(before), evenly(now), evenly(before)
+    count = len(ratio)
+    deviation, part, part_deviation = np.empty(count), np.empty(count), np.empty(count)
+    expected, falls = np.empty(count), np.empty(count, np.bool_)
+    for e in range(count):
+        size, along, grown = max(length(now.tangential[e]), _LEAST_FORCE), 0.0, 0.0
+        for a in range(3):
+            along += even[e, a] * now.tangential[e, a] / size
+            grown += (even[e, a] - even_before[e, a]) * now.tangential[e, a] / size
+        share = ratio[e] / max(along, tuning.least_change)
+        share = min(max(share, 1.0 / tuning.largest_share), tuning.largest_share)
+        most, change = max(abs(grown) * share, tuning.least_change), ratio[e] - last[e]
+        deviation[e] = noise * math.sqrt(1.0 + ratio[e] * ratio[e]) / max(now.normal[e], _LEAST_FORCE)
+        part[e], part_deviation[e] = change / most, math.sqrt(2.0) * deviation[e] / most
+        expected[e], falls[e] = grown, change < 0.0
+    return Sharing(ratio, deviation, part, part_deviation, expected, falls)
 
 
-def log_density(x: FloatArray, mean: FloatArray | float, deviation: FloatArray | float) -> FloatArray:
+@compiled
+def log_density(x: float, mean: float, deviation: float) -> float:
     """Of a normal distribution, up to a constant."""
-    density: FloatArray = -0.5 * ((x - mean) / deviation) ** 2 - np.log(deviation)
+    away = (x - mean) / deviation
+    return -0.5 * away * away - math.log(deviation)
+
+
+@compiled
+def log_sum(one: float, other: float) -> float:
+    """Logarithm of the sum of two numbers of which the logarithms are given."""
+    return max(one, other) + math.log1p(math.exp(-abs(one - other)))
+
+
+@compiled
+def stick_density(seen: Sharing, tuning: ForcesTuning) -> FloatArray:
+    """Log density [k] of the part that sticking elements take: as before, or more for others that slip."""
+    density, share = np.empty(len(seen.part)), tuning.overload_share
+    for e in range(len(density)):
+        part, noise = seen.part[e], seen.part_deviation[e]
+        as_before = log_density(part, 1.0, math.hypot(tuning.part_spread, noise))
+        more = log_density(part, tuning.overload, math.hypot(tuning.overload_spread, noise))
+        mixed = log_sum(math.log1p(-share) + as_before, math.log(share) + more)
+        density[e] = log_sum(math.log1p(-tuning.outlier_share) + mixed, anything(part, noise, tuning))
     return density
 
 
-def stick_density(seen: Sharing, options: ForcesOnlyOptions) -> FloatArray:
-    """Log density [k] of the part that sticking elements take: as before, or more for others that slip."""
-    as_before = log_density(seen.part, 1.0, np.hypot(options.part_spread, seen.part_deviation))
-    more = log_density(seen.part, options.overload, np.hypot(options.overload_spread, seen.part_deviation))
-    share = options.overload_share
-    mixed = np.logaddexp(np.log1p(-share) + as_before, np.log(share) + more)
-    return _or_anything(mixed, seen, options)
-
-
-def slip_density(seen: Sharing, friction: FloatArray, options: ForcesOnlyOptions) -> FloatArray:
+@compiled
+def slip_density(seen: Sharing, friction: FloatArray, tuning: ForcesTuning) -> FloatArray:
     """Log density [g, k] of the part that slipping elements take, for each ``friction`` [g].
 
     An element slips from its rim inwards, and what sticks in it takes on load until nothing does: the compliance of a
     contact in partial slip (Mindlin, 1949) goes with (1 − f_t/μf_n)^⅓, here with an exponent of its own.
     """
-    left = np.maximum(1.0 - seen.ratio / friction[:, None], 0.0)
-    part = options.slip_part * left**options.slip_exponent
-    taken = log_density(seen.part, part, np.hypot(options.slip_part_spread, seen.part_deviation))
-    return _or_anything(taken, seen, options)
+    density, inlier = np.empty((len(friction), len(seen.part))), math.log1p(-tuning.outlier_share)
+    for e in range(len(seen.part)):
+        part, noise = seen.part[e], seen.part_deviation[e]
+        spread, otherwise = math.hypot(tuning.slip_part_spread, noise), anything(part, noise, tuning)
+        for k in range(len(friction)):
+            left = max(1.0 - seen.ratio[e] / friction[k], 0.0)
+            taken = log_density(part, tuning.slip_part * left**tuning.slip_exponent, spread)
+            density[k, e] = log_sum(inlier + taken, otherwise)
+    return density
 
 
-def _or_anything(density: FloatArray, seen: Sharing, options: ForcesOnlyOptions) -> FloatArray:
-    share = options.outlier_share
-    anything = log_density(seen.part, 1.0, np.hypot(1.0, seen.part_deviation))
-    mixed: FloatArray = np.logaddexp(np.log1p(-share) + density, np.log(share) + anything)
-    return mixed
+@compiled
+def anything(part: float, noise: float, tuning: ForcesTuning) -> float:
+    """Log density of the part that an element takes of which it says nothing, and of its being one of those."""
+    return math.log(tuning.outlier_share) + log_density(part, 1.0, math.hypot(1.0, noise))

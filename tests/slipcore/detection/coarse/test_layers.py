@@ -6,11 +6,12 @@ import pytest
 from slipcore.defaults import CoarseOptions
 from slipcore.detection.coarse.layers import (
     NORMAL,
+    Believed,
     Layers,
     PressedElements,
     believed,
-    follow_layers,
     load_layers,
+    look_at_layers,
     no_layers,
     spread_of_stiffness,
     sums,
@@ -53,6 +54,13 @@ def pulled(load: float, back: float = 0.0) -> FloatArray:
 def depth() -> FloatArray:
     """The same everywhere: elements whose forces differ are no springs by themselves."""
     return np.full(len(PLACE), 1e-3)
+
+
+def follow_layers(layers: Layers, seen: PressedElements, considered: Believed) -> Layers:
+    """The layers after a frame."""
+    after = Layers(*(array.copy() for array in layers))
+    look_at_layers(seen, after, considered)
+    return after
 
 
 def after_press() -> Layers:

@@ -9,7 +9,7 @@ from benchmarks.detector.accuracy import count
 from benchmarks.detector.pillars import Grasp
 from benchmarks.detector.scenes import observed
 from slipcore import GraspLog, InvalidInput, SlipDetector, SlipHistory, detect_slip
-from slipcore.detection.forces_only.method import frictions
+from slipcore.detection.forces_only.tuning import frictions
 
 MARKER_NOISE, FORCE_NOISE = 5e-6, 1e-2
 PRESSED = -1e-4, -1e-4, 1e-3, 1e-3

@@ -3,11 +3,12 @@
 import numpy as np
 
 from slipcore.defaults import ForcesOnlyOptions
-from slipcore.detection.forces_only.sharing import Loads, compare, slip_density, stick_density
+from slipcore.detection.forces_only.sharing import Loads, compare, evenly, slip_density, stick_density
+from slipcore.detection.forces_only.tuning import considered, forces_tuning
 
 PLACE = 1e-3 * np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0], [5.0, 5.0], [-2.0, 1.0]])
 NORMAL = np.array([0.5, 1.0, 0.2, 0.4, 0.9])
-OPTIONS = ForcesOnlyOptions()
+OPTIONS = forces_tuning(considered(ForcesOnlyOptions()).settings)
 
 
 def loads(ratio: np.ndarray) -> Loads:
@@ -22,7 +23,7 @@ def rigid(x: float, y: float, turn: float) -> np.ndarray:
 
 def test_a_load_that_is_shared_by_the_normal_force_is_told_exactly_with_its_torque() -> None:
     ratio = rigid(0.2, -0.1, 30.0)
-    np.testing.assert_allclose(loads(ratio).evenly, ratio, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(evenly(loads(ratio)), ratio, rtol=1e-12, atol=1e-15)
 
 
 def test_elements_that_go_on_sharing_as_before_take_their_whole_part() -> None:

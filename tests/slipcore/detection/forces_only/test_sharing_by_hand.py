@@ -5,9 +5,20 @@ import pytest
 from scipy import stats
 
 from slipcore.defaults import NUMERICS, ForcesOnlyOptions
-from slipcore.detection.forces_only.sharing import Loads, Sharing, compare, log_density, slip_density, stick_density
+from slipcore.detection.forces_only.sharing import (
+    Loads,
+    Sharing,
+    compare,
+    evenly,
+    log_density,
+    ratios,
+    sideways,
+    slip_density,
+    stick_density,
+)
+from slipcore.detection.forces_only.tuning import considered, forces_tuning
 
-OPTIONS = ForcesOnlyOptions()
+OPTIONS = forces_tuning(considered(ForcesOnlyOptions()).settings)
 
 
 def two(*along: float) -> Loads:
@@ -19,25 +30,28 @@ def two(*along: float) -> Loads:
 
 def test_a_ratio_is_that_of_the_length_of_the_force_and_finite_without_pressure() -> None:
     tangential = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 2.0], [1.0, 0.0, 0.0]])
-    ratio = Loads(np.zeros((3, 2)), np.array([10.0, 4.0, 0.0]), tangential).ratio
+    ratio = ratios(Loads(np.zeros((3, 2)), np.array([10.0, 4.0, 0.0]), tangential))
     np.testing.assert_allclose(ratio[:2], [0.5, 0.5], rtol=1e-12)
     assert ratio[2] == pytest.approx(1.0 / NUMERICS.least_element_force, rel=1e-12)
 
 
 def test_a_force_across_the_arm_turns_and_one_along_it_does_not() -> None:
-    np.testing.assert_allclose(two(0.4, 0.4).evenly, [[0.2, 0.0, 0.0], [0.2, 0.0, 0.0]], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(evenly(two(0.4, 0.4)), [[0.2, 0.0, 0.0], [0.2, 0.0, 0.0]], rtol=1e-12, atol=1e-15)
     across = two(0.0, 0.0)._replace(tangential=np.array([[0.0, 0.5, 0.1], [0.0, 0.7, 0.3]]))
     # Σr × f = −3 mm · 0.5 N + 1 mm · 0.7 N over Σp r² = (9 + 3) N mm²
     turn = -0.8e-3 / 12e-6
     expected = [[0.0, 0.3 + turn * -3e-3, 0.1], [0.0, 0.3 + turn * 1e-3, 0.1]]
-    np.testing.assert_allclose(across.evenly, expected, rtol=1e-6)
+    np.testing.assert_allclose(evenly(across), expected, rtol=1e-6)
 
 
 def test_a_change_counts_by_its_sum_and_by_its_moment_over_the_radius_of_gyration() -> None:
-    change = np.array([[0.0, 0.5, 0.0], [0.0, 0.7, 0.0]])
-    gyration = np.sqrt(12e-6 / 4.0)
-    assert two(0.0, 0.0).sideways(change) == pytest.approx(np.hypot(1.2, 0.8e-3 / gyration), rel=1e-6)
-    assert two(0.0, 0.0).sideways(np.array([[0.3, 0.0, 0.0], [0.1, 0.0, 0.3]])) == pytest.approx(0.5, rel=1e-9)
+    before, gyration = two(0.1, 0.2), np.sqrt(12e-6 / 4.0)
+    for change, size in (
+        ([[0.0, 0.5, 0.0], [0.0, 0.7, 0.0]], np.hypot(1.2, 0.8e-3 / gyration)),
+        ([[0.3, 0.0, 0.0], [0.1, 0.0, 0.3]], 0.5),
+    ):
+        now = before._replace(tangential=before.tangential + change)
+        assert sideways(before, now) == pytest.approx(size, rel=1e-6)
 
 
 def test_what_elements_take_is_told_over_what_they_should_with_its_noise() -> None:
@@ -69,7 +83,8 @@ def test_shares_and_changes_that_are_too_small_are_bounded() -> None:
 def test_a_density_is_the_normals_up_to_a_constant() -> None:
     x, mean, deviation = np.array([0.3, -1.0, 2.0]), np.array([0.0, 1.0, 2.0]), np.array([0.5, 2.0, 1.0])
     exact = stats.norm(mean, deviation).logpdf(x) + 0.5 * np.log(2.0 * np.pi)
-    np.testing.assert_allclose(log_density(x, mean, deviation), exact, rtol=1e-12, atol=1e-15)
+    found = [log_density(*each) for each in zip(x, mean, deviation, strict=True)]
+    np.testing.assert_allclose(found, exact, rtol=1e-12, atol=1e-15)
 
 
 def seen(part: list[float], ratio: list[float], noise: float = 0.3) -> Sharing:
