@@ -1,6 +1,6 @@
 """What the repositories hand out and take in: plain frozen records, independent of any session."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal, NamedTuple
@@ -172,13 +172,20 @@ class Gel:
     """The mechanics of a sensor's gel, from which forces follow where it measures none.
 
     ``young_modulus`` Pa; ``thickness`` m from its surface to a rigid base, None where it is thick against any contact;
-    ``marker_depth`` m of the markers below the surface.
+    ``marker_depth`` m of the markers below the surface; ``relative_thickness``: of a gel that is not alike thick
+    everywhere, at each marker, row by row, over ``thickness``.
     """
 
     young_modulus: float
     poisson_ratio: float
     thickness: float | None
     marker_depth: float
+    relative_thickness: Sequence[Sequence[float]] | None = None
+
+    def __post_init__(self) -> None:
+        if self.relative_thickness is not None:  # of JSON, which knows no tuples, and alike if its numbers are
+            rows = tuple(tuple(map(float, row)) for row in self.relative_thickness)
+            object.__setattr__(self, "relative_thickness", rows)
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,8 +108,9 @@ class MaterialOwnerRow(Base):
 class SensorRow(Base):
     """A tactile sensor that logs come from, with the mechanics of its gel where they are known.
 
-    ``young_modulus`` Pa; ``thickness`` m down to a rigid base, NULL without one; ``marker_depth`` m; ``described_by``
-    is NULL where that was an admin, or nobody by a key.
+    ``young_modulus`` Pa; ``thickness`` m down to a rigid base, NULL without one; ``marker_depth`` m;
+    ``relative_thickness`` at each marker over ``thickness``, NULL where it is alike everywhere; ``described_by`` is
+    NULL where that was an admin, or nobody by a key.
     """
 
     __tablename__ = "sensors"
@@ -121,6 +122,7 @@ class SensorRow(Base):
     poisson_ratio: Mapped[float | None]
     thickness: Mapped[float | None]
     marker_depth: Mapped[float | None]
+    relative_thickness: Mapped[list[list[float]] | None] = mapped_column(JSON(none_as_null=True))
     described_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
 
 

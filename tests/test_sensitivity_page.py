@@ -34,7 +34,10 @@ ENTRIES = {
         "force_to_noise least_coupling",
         "of friction and slip, which no press gives",
     ),
-    "slipcore.forces.RESPONSE": ("digits", "which offsets are evaluated once, no result"),
+    "slipcore.forces.RESPONSE": (
+        "digits least_change least_distance neighbours plane thicknesses",
+        "which offsets are evaluated once, no result; and of gels not alike thick, on which no press on the page is",
+    ),
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor heading_length", "0 but of reconstructed forces, which the page's logs do not have"),

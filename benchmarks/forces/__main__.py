@@ -9,7 +9,8 @@ the prior's strength, and the gel's description, which is then wrong. It is also
 the end of a range (benchmarks/forces/saturation.py), an independent solver's scenes are read
 (benchmarks/forces/references.py), grasps are taken to friction and slip with the gripper's force alone
 (benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py), and maps of height are read
-(benchmarks/forces/height_maps.py). In the plane the normal force on a half-space is given.
+(benchmarks/forces/height_maps.py); and gels that are not alike thick everywhere are pressed on
+(benchmarks/forces/uneven.py). In the plane the normal force on a half-space is given.
 Peers are given the same displacements. Errors are those of resultants, of the field of forces on elements, and their
 growth with noise; how often stated intervals of 95 % hold the truth is reported for each group.
 
@@ -42,6 +43,7 @@ from benchmarks.forces import references as gel_references
 from benchmarks.forces import saturation as gel_saturation
 from benchmarks.forces import slip as gel_slip
 from benchmarks.forces import stream as gel_stream
+from benchmarks.forces import uneven as gel_uneven
 from benchmarks.forces.peers import PEERS, export, imported, made
 from benchmarks.forces.presses import calibrated, calibration_table
 from benchmarks.forces.scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
@@ -69,7 +71,7 @@ STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "criterion", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
-SLIP_GROUP, HEIGHT_GROUP = "slip by sensor", "height maps"
+SLIP_GROUP, HEIGHT_GROUP, UNEVEN_GROUP = "slip by sensor", "height maps", "uneven gel"
 COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
@@ -420,6 +422,17 @@ def see_depth(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {HEIGHT_GROUP: text}, arguments, "forces-height-maps.json")
 
 
+def lean(arguments: argparse.Namespace) -> None:
+    """Gels that are not alike thick everywhere; a line a case while it goes on."""
+    found = list[gel_uneven.Outcome]()
+    for each in gel_uneven.outcomes():
+        found.append(each)
+        print(each, flush=True)
+    text = gel_uneven.uneven_table(found)
+    print(f"{UNEVEN_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {UNEVEN_GROUP: text}, arguments, "forces-uneven-gel.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
@@ -433,6 +446,7 @@ def main() -> None:
         FRICTION_GROUP: grip,
         SLIP_GROUP: slip,
         HEIGHT_GROUP: see_depth,
+        UNEVEN_GROUP: lean,
     }
     every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)

@@ -389,7 +389,7 @@ def sensors() -> Call[list[dict[str, Any]]]:
     return (yield from _listed("/v1/sensors", dict))
 
 
-def describe_sensor(name: str, gel: Mapping[str, float | None]) -> Call[dict[str, Any]]:
+def describe_sensor(name: str, gel: Mapping[str, Any]) -> Call[dict[str, Any]]:
     """Say what a sensor's gel is."""
     return _record(dict, (yield from _ask(Request("PUT", f"/v1/sensors/{_part(name)}", json=dict(gel)))))
 

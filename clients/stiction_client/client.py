@@ -257,9 +257,14 @@ class FrictionClient:
         poisson_ratio: float,
         thickness: float | None = None,
         marker_depth: float = 0.0,
+        relative_thickness: Sequence[Sequence[float]] | None = None,
     ) -> dict[str, Any]:
-        """Describe a sensor's gel (Pa, m; thickness None: a half-space), from which forces of its logs then follow."""
-        return self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
+        """Describe a sensor's gel (Pa, m; thickness None: a half-space), from which forces of its logs then follow.
+
+        ``relative_thickness`` [n, m]: of one that is not alike thick everywhere, at each marker, over ``thickness``.
+        """
+        gel = _gel(young_modulus, poisson_ratio, thickness, marker_depth, relative_thickness)
+        return self._run(calls.describe_sensor(name, gel))
 
     def calibrate_sensor(self, name: str, presses: Mapping[str, float | None]) -> dict[str, Any]:
         """Learn a sensor's faults from stored logs of a body pressed straight down, by which its later logs are then
@@ -481,9 +486,11 @@ class AsyncFrictionClient:
         poisson_ratio: float,
         thickness: float | None = None,
         marker_depth: float = 0.0,
+        relative_thickness: Sequence[Sequence[float]] | None = None,
     ) -> dict[str, Any]:
         """As ``FrictionClient.describe_sensor``."""
-        return await self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
+        gel = _gel(young_modulus, poisson_ratio, thickness, marker_depth, relative_thickness)
+        return await self._run(calls.describe_sensor(name, gel))
 
     async def calibrate_sensor(self, name: str, presses: Mapping[str, float | None]) -> dict[str, Any]:
         """As ``FrictionClient.calibrate_sensor``."""
@@ -630,11 +637,18 @@ def _job_id(job: Job | GraspLogReceipt | str) -> str:
 
 
 def _gel(
-    young_modulus: float, poisson_ratio: float, thickness: float | None, marker_depth: float
-) -> dict[str, float | None]:
-    return {
+    young_modulus: float,
+    poisson_ratio: float,
+    thickness: float | None,
+    marker_depth: float,
+    relative_thickness: Sequence[Sequence[float]] | None,
+) -> dict[str, Any]:
+    gel: dict[str, Any] = {
         "young_modulus": young_modulus,
         "poisson_ratio": poisson_ratio,
         "thickness": thickness,
         "marker_depth": marker_depth,
     }
+    if relative_thickness is not None:  # which older services do not know
+        gel["relative_thickness"] = [list(map(float, row)) for row in relative_thickness]
+    return gel

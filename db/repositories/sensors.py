@@ -1,6 +1,7 @@
 """Queries on sensors and the mechanics of their gels."""
 
 from collections.abc import Collection
+from dataclasses import asdict
 
 from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
@@ -77,6 +78,7 @@ def describe(session: Session, name: str, gel: Gel, by: str | None = None) -> Se
     row = session.get_one(SensorRow, find_or_add(session, name))
     row.young_modulus, row.poisson_ratio = gel.young_modulus, gel.poisson_ratio
     row.thickness, row.marker_depth = gel.thickness, gel.marker_depth
+    row.relative_thickness = asdict(gel)["relative_thickness"]
     row.described_by = by
     session.flush()
     return get(session, name)
@@ -85,5 +87,5 @@ def describe(session: Session, name: str, gel: Gel, by: str | None = None) -> Se
 def _record(row: SensorRow, calibration: int | None) -> Sensor:
     if row.young_modulus is None or row.poisson_ratio is None:
         return Sensor(row.id, row.name, None, calibration)
-    gel = Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0)
+    gel = Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0, row.relative_thickness)
     return Sensor(row.id, row.name, gel, calibration, row.described_by)

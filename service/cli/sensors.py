@@ -1,7 +1,7 @@
 """Commands on sensors: list, describe, calibrate, calibrate-gel."""
 
 from collections.abc import Mapping, Sequence
-from json import dumps
+from json import dumps, loads
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,12 +36,15 @@ def list_sensors(url: Url = DEFAULT_URL, key: Key = None, json: Json = False) ->
         print_table("Sensors", columns, [[each["name"], *_cells(each["gel"])] for each in found])
 
 
-def _cells(gel: Mapping[str, float | None] | None) -> list[str]:
-    """The mechanics of a gel; a thickness of None is that of a half-space."""
+def _cells(gel: Mapping[str, Any] | None) -> list[str]:
+    """The mechanics of a gel; a thickness of None is that of a half-space, and of a map the least and the most."""
     if gel is None:
         return []
-    thickness = gel["thickness"]
+    thickness, uneven = gel["thickness"], gel.get("relative_thickness")
     own, depth = (number(gel[name]) for name in ("young_modulus", "poisson_ratio")), number(gel["marker_depth"])
+    if uneven:
+        thinnest, thickest = (thickness * of(map(of, uneven)) for of in (min, max))
+        return [*own, f"{number(thinnest)} … {number(thickest)}", depth]
     return [*own, "thick" if thickness is None else number(thickness), depth]
 
 
@@ -54,13 +57,26 @@ def describe(
         float | None, typer.Option(help="Surface to rigid base, m; without it the gel is thick against any contact.")
     ] = None,
     marker_depth: Annotated[float, typer.Option(help="Of the markers below the surface, m.")] = 0.0,
+    relative_thickness: Annotated[
+        Path | None,
+        typer.Option(help="Of a gel not alike thick everywhere: a JSON file of rows, at each marker over --thickness."),
+    ] = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
 ) -> None:
     """Describe a sensor's gel, so that forces of its logs are reconstructed where they have none."""
+    uneven = None if relative_thickness is None else _rows_of(relative_thickness)
     with connected(url, key) as client:
-        client.describe_sensor(sensor, young_modulus, poisson_ratio, thickness, marker_depth)
+        client.describe_sensor(sensor, young_modulus, poisson_ratio, thickness, marker_depth, uneven)
     typer.echo(f"{sensor} is described: logs of it without forces get reconstructed ones from now on")
+
+
+def _rows_of(path: Path) -> list[list[float]]:
+    """Numbers of a JSON file, row by row; which they may be the service says."""
+    try:
+        return [[float(value) for value in row] for row in loads(path.read_bytes())]
+    except (OSError, TypeError, ValueError) as error:
+        raise typer.BadParameter(f"--relative-thickness of {path}: {error}; allowed: [[1.0, 0.9, …], …]") from error
 
 
 @app.command()

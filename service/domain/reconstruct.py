@@ -1,7 +1,7 @@
 """Forces of logs that have none, where their sensor's gel is known."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from slipcore import Finding, GraspLog
@@ -35,7 +35,7 @@ def bytes_needed(log: "GraspLog") -> int:
     return look.bytes_needed(log.position, log.element_area)
 
 
-def with_forces(log: "GraspLog", gel: Mapping[str, float | None]) -> "tuple[GraspLog, Reconstruction]":
+def with_forces(log: "GraspLog", gel: Mapping[str, Any]) -> "tuple[GraspLog, Reconstruction]":
     """The log with forces that follow from its displacement by this gel (``slipcore.forces.Gel.from_json``)."""
     from slipcore.forces import Gel, reconstruct  # few logs need it
 

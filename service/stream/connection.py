@@ -148,7 +148,7 @@ class _Connection:
 
         return await self._context.threads.run(self._principal.share, read)
 
-    async def _gel(self, opening: Open) -> tuple[dict[str, float | None] | None, list[dict[str, Any]]]:
+    async def _gel(self, opening: Open) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
         """Of the sensor, if one is named and described, with what is to be known of it."""
 
         def find() -> Sensor | None:

@@ -92,7 +92,7 @@ class SessionOptions(NamedTuple):
 
     control: Control | None = None
     model: "stiction_client.FrictionModel | None" = None
-    gel: Mapping[str, float | None] | None = None
+    gel: Mapping[str, Any] | None = None
     materials: "Mapping[str, stiction_client.FrictionModel] | None" = None
 
 

@@ -42,7 +42,7 @@ class Reconstructing:
     a detector goes; ``alike``: forces of the last frame as friction samples are collected from them.
     """
 
-    gel: Mapping[str, float | None]
+    gel: Mapping[str, Any]
     owner: str
     stream: "ForceStream | None" = None
     refused: str | None = None

@@ -116,7 +116,7 @@ class Streams:
         key_id: str | None,
         address: str,
         model: "FrictionModel | None" = None,
-        gel: Mapping[str, float | None] | None = None,
+        gel: Mapping[str, Any] | None = None,
         materials: "Mapping[str, FrictionModel] | None" = None,
     ) -> Session:
         """A new session; ``model``: what a grip controller that was asked for begins with, ``materials``: what it

@@ -145,8 +145,17 @@ def _check_charset(content_type: str) -> None:
 
 def checked(shape: type[Shape], fields: Mapping[str, str]) -> Shape:
     """What was sent, in the API's own shape and bounds; raises ``RequestValidationError``."""
+    return _checked(shape.model_validate_strings, {name: text for name, text in fields.items() if text != ""})
+
+
+def revised(shape: type[Shape], values: Mapping[str, Any]) -> Shape:
+    """What was sent beside what is kept, alike."""
+    return _checked(shape.model_validate, dict(values))
+
+
+def _checked(validate: Callable[[Any], Shape], values: Mapping[str, Any]) -> Shape:
     try:
-        return shape.model_validate_strings({name: text for name, text in fields.items() if text != ""})
+        return validate(values)
     except ValidationError as error:
         wrong = [{**each, "loc": ("form", *each["loc"])} for each in error.errors()]
         raise RequestValidationError(wrong) from error

@@ -18,6 +18,10 @@ class GelLimits:
     """Pa; softer than any gel, stiffer than any solid."""
     thickness: float = 1e-6
     """m, at least."""
+    relative_thickness: tuple[float, float] = (0.25, 4.0)
+    """Of a place, over the gel's thickness."""
+    slope: float = 0.35
+    """m a m, by which the thickness changes at most."""
     marker_depth: float = 1.0
     """m, at most."""
 
@@ -43,6 +47,18 @@ class ResponseDefaults(Options):
     """Within which they are."""
     digits: Annotated[int, Option(3, 12, "decimals", "far below what a spline misses")] = 9
     """Of a cell, to which offsets of markers from nodes that are alike agree; each is evaluated once."""
+    thicknesses: Annotated[int, Option(1, 100, "thicknesses", "1e-3 of the response where they differ by four")] = 5
+    """Of layers, between which those of a gel that is not alike thick everywhere are interpolated."""
+    least_change: Annotated[float, Option(1e-9, 1.0, "-", "rounding")] = 1e-3
+    """Half of the range, in logarithms, that these span at least."""
+    plane: Annotated[
+        float, Option(0.0, 1.0, "-", "an ellipse: 0.44 where a layer is thin beside it, 0.35 where thick")
+    ] = 0.4
+    """How deep in such a gel, as a share of its thickness, the plane lies that markers and nodes are framed by."""
+    neighbours: Annotated[int, Option(1, 100, "markers", "midway between four of a lattice")] = 4
+    """By which the thickness at a node is interpolated."""
+    least_distance: Annotated[float, Option(1e-9, 1.0, "-", "rounding")] = 1e-6
+    """Of a marker, in the smallest there is, that is taken to lie at a node."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -574,6 +574,10 @@ def test_a_sensor_is_described_and_calibrated(ask: Ask, service: Service) -> Non
     assert ask(server, "describe_sensor", "tac 1", 2e5, 0.48, marker_depth=1e-3)["name"] == "tac 1"
     gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 1e-3}
     assert (server.requests[0].method, json.loads(server.requests[0].content)) == ("PUT", gel)
+    server = service({"name": "tac 1", "calibration": None})
+    ask(server, "describe_sensor", "tac 1", 2e5, 0.48, 4e-3, 1e-3, ((1, 0.9), (0.8, 1)))
+    uneven = gel | {"thickness": 4e-3, "relative_thickness": [[1.0, 0.9], [0.8, 1.0]]}
+    assert json.loads(server.requests[0].content) == uneven
     server = service({"version": 2})
     assert ask(server, "calibrate_sensor", "tac 1", {"g1": 5.0, "g2": None}) == {"version": 2}
     presses = [{"grasp_log": "g1", "known_force": 5.0}, {"grasp_log": "g2", "known_force": None}]

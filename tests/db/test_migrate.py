@@ -499,3 +499,19 @@ def test_a_key_that_expires_stops_the_way_back(database: Database) -> None:
     with database.write() as session:
         access_keys.revoke(session, "0" * 12)
     migrate.downgrade(database, "0009")
+
+
+def test_gels_are_kept_by_the_way_to_maps_of_their_thickness(database: Database) -> None:
+    """And a map is named by the way back, which has no place for it."""
+    gel = Gel(2e5, 0.48, 4e-3, 1e-3)
+    with database.write() as session:
+        sensors.describe(session, "flat", gel)
+    migrate.downgrade(database, "0031")
+    migrate.upgrade(database)
+    uneven = replace(gel, relative_thickness=[[1, 0.9], [0.8, 1.0]])
+    with database.write() as session:
+        assert sensors.get(session, "flat").gel == gel
+        assert sensors.describe(session, "dome", uneven).gel == uneven
+    assert uneven.relative_thickness == ((1.0, 0.9), (0.8, 1.0))
+    with pytest.raises(SchemaMismatch, match="1 maps of gels' thickness"):
+        migrate.downgrade(database, "0031")

@@ -11,7 +11,13 @@ from db.records import Calibration, CalibrationPress, Gel, Sensor
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Reference
 from slipcore.defaults import LIMITS
 
-GEL_EXAMPLE: JsonDict = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
+GEL_EXAMPLE: JsonDict = {
+    "young_modulus": 2.5e5,
+    "poisson_ratio": 0.48,
+    "thickness": 4e-3,
+    "marker_depth": 5e-4,
+    "relative_thickness": None,
+}
 SENSOR_EXAMPLE: JsonDict = {"name": "GelSight Mini", "gel": GEL_EXAMPLE, "calibration": None}
 PRESS_EXAMPLE: JsonDict = {"grasp_log": "7c9e6679742540de944be07fc1f90ae7", "known_force": 2.0}
 ESTIMATE_EXAMPLE: JsonDict = {
@@ -34,6 +40,10 @@ CALIBRATION_EXAMPLE: JsonDict = {
 }
 
 
+ThicknessRow = Annotated[list[Annotated[float, Field(ge=0.25, le=4.0)]], Field(min_length=2, max_length=64)]
+UNEVEN = "Of a gel that is not alike thick everywhere: at each marker, row by row, over `thickness`; null: alike"
+
+
 class GelIn(Body):
     """The mechanics of a sensor's gel."""
 
@@ -47,6 +57,21 @@ class GelIn(Body):
     ] = None
     marker_depth: Annotated[float, Field(ge=0.0, lt=1.0, description="m of the markers below the surface")] = 0.0
 
+    relative_thickness: Annotated[
+        list[ThicknessRow] | None,
+        Field(min_length=2, max_length=64, description=UNEVEN),
+    ] = None
+
+    @model_validator(mode="after")
+    def _map_is_a_lattice(self) -> "GelIn":
+        if self.relative_thickness is None:
+            return self
+        if self.thickness is None or len({len(row) for row in self.relative_thickness}) > 1:
+            raise ValueError("relative_thickness of rows alike, and a thickness beside it")
+        if self.marker_depth >= self.thickness * min(map(min, self.relative_thickness)):
+            raise ValueError("marker_depth below the thickness everywhere")
+        return self
+
     @model_validator(mode="after")
     def _markers_lie_in_the_gel(self) -> "GelIn":
         if self.thickness is not None and self.marker_depth >= self.thickness:
@@ -55,7 +80,7 @@ class GelIn(Body):
 
     def record(self) -> Gel:
         """As it is stored."""
-        return Gel(self.young_modulus, self.poisson_ratio, self.thickness, self.marker_depth)
+        return Gel(self.young_modulus, self.poisson_ratio, self.thickness, self.marker_depth, self.relative_thickness)
 
 
 class GelOut(BaseModel):
@@ -67,6 +92,7 @@ class GelOut(BaseModel):
     poisson_ratio: float
     thickness: Annotated[float | None, Field(description="m from the surface to the rigid base; null: a half-space")]
     marker_depth: Annotated[float, Field(description="m of the markers below the surface")]
+    relative_thickness: Annotated[list[list[float]] | None, Field(description=UNEVEN)]
 
 
 class SensorOut(BaseModel):

@@ -21,7 +21,7 @@ from service.http.paging import Page
 from service.http.routes.sensors import SensorName
 from service.http.schemas.common import CursorText
 from service.http.schemas.sensors import GelIn
-from service.web.forms import FormRoute, checked
+from service.web.forms import FormRoute, checked, revised
 from service.web.rendering import on_problem, render
 from service.web.routes.materials import LOGS_ON_A_PAGE, ON_A_PAGE
 
@@ -30,7 +30,8 @@ router = APIRouter(include_in_schema=False, route_class=FormRoute)
 SHOWN_CALIBRATIONS = 5
 """The newest of a sensor; the API has all."""
 
-FIELDS = tuple(GelIn.model_fields)
+FIELDS = tuple(name for name in GelIn.model_fields if name != "relative_thickness")
+"""In the form; a map of the thickness is kept, as the API or the command line gave it."""
 FieldText = Annotated[str, Form(max_length=40)]
 
 
@@ -66,9 +67,11 @@ def describe_sensor(
     fields = dict(zip(FIELDS, (young_modulus, poisson_ratio, thickness, marker_depth), strict=True))
     sensor = sensors.find(context, name)
     on_problem(request, "sensor.html", **_shown(context, request, sensor, None), fields=fields)
-    sensors.describe(
-        context, name, checked(GelIn, {each: text.strip() for each, text in fields.items()}).record(), principal
-    )
+    told = checked(GelIn, {each: text.strip() for each, text in fields.items()})
+    if sensor.gel is not None and sensor.gel.relative_thickness is not None:
+        rows = [list(row) for row in sensor.gel.relative_thickness]
+        told = revised(GelIn, told.model_dump() | {"relative_thickness": rows})
+    sensors.describe(context, name, told.record(), principal)
     return RedirectResponse(f"/sensors/{quote(name, safe='')}", 303)
 
 

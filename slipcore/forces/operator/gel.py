@@ -13,12 +13,15 @@ from slipcore.forces.defaults import GEL
 class Gel:
     """Gel of ``young_modulus`` Pa and ``poisson_ratio``, bonded to a rigid base ``thickness`` m below its surface (inf:
     a half-space), with markers ``marker_depth`` m below the surface. Raises ``InvalidInput``.
+
+    ``relative_thickness``: of a gel that is not alike thick everywhere, at each marker [n, m], over ``thickness``.
     """
 
     young_modulus: float
     poisson_ratio: float
     thickness: float = math.inf
     marker_depth: float = 0.0
+    relative_thickness: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
         softest, stiffest = GEL.young_modulus
@@ -29,6 +32,20 @@ class Gel:
         _check("thickness", self.thickness, thick, f"{GEL.thickness:g} m or more, inf for a half-space")
         inside = 0.0 <= self.marker_depth < min(self.thickness, GEL.marker_depth)
         _check("marker_depth", self.marker_depth, inside, f"0 m to less than the thickness, {self.thickness:g} m")
+        if self.relative_thickness is not None:
+            self._check_map(self.relative_thickness)
+
+    def _check_map(self, rows: tuple[tuple[float, ...], ...]) -> None:
+        least, most = GEL.relative_thickness
+        _check("thickness", self.thickness, math.isfinite(self.thickness), "finite, beside relative_thickness")
+        widths, name = {len(row) for row in rows}, "relative_thickness"
+        is_lattice = len(rows) > 1 and len(widths) == 1 and widths.pop() > 1
+        if not is_lattice:
+            raise InvalidInput(name, f"{len(rows)} rows", "as many numbers in each, one a marker, 2 × 2 or more")
+        for value in (each for row in rows for each in row):
+            _check(name, value, least <= value <= most, f"{least:g} to {most:g}")
+        thinnest = self.thickness * min(map(min, rows))
+        _check("marker_depth", self.marker_depth, self.marker_depth < thinnest, f"less than {thinnest:g} m, the least")
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any]) -> "Gel":
@@ -37,13 +54,19 @@ class Gel:
         """
         names = [each.name for each in fields(cls)]
         try:
-            return cls(**{name: _number(name, value) for name, value in told.items()})
+            return cls(**{name: _read(name, value) for name, value in told.items()})
         except (AttributeError, TypeError) as error:
             raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
 
     def to_json(self) -> dict[str, float | None]:
         """As ``from_json`` reads it."""
         return asdict(self) | {"thickness": self.thickness if math.isfinite(self.thickness) else None}
+
+
+def _read(name: str, told: Any) -> Any:
+    if name != "relative_thickness":
+        return _number(name, told)
+    return None if told is None else tuple(tuple(_number(name, value) for value in row) for row in told)
 
 
 def _number(name: str, told: object) -> float:

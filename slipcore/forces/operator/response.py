@@ -14,6 +14,7 @@ from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.forces.defaults import RESPONSE
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.frames import FloatArray
 
 ODD_X, ODD_Y = frozenset({"xy", "zx", "xz"}), frozenset({"xy", "zy", "yz"})
@@ -30,11 +31,26 @@ def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
 
 
 def response_matrices(
-    gel: Gel, pitch: float, nodes: Sequence[FloatArray], position: FloatArray, axes: Sequence[int] = (0, 1, 2)
+    gel: Gel,
+    pitch: float,
+    nodes: Sequence[FloatArray],
+    position: FloatArray,
+    axes: Sequence[int] = (0, 1, 2),
+    uneven: UnevenLayer | None = None,
 ) -> list[FloatArray]:
     """``response_matrix`` of several sets of ``nodes`` [k, 2] m, whose hat functions have the half-width ``pitch`` m,
-    and of displacement along some ``axes`` alone.
+    and of displacement along some ``axes`` alone; ``uneven``: the gel under these markers, if it is so.
     """
+    if uneven is None:
+        return _of_a_layer(gel, pitch, nodes, position, axes)
+    whole = uneven.responses(gel, nodes, lambda alike: _of_a_layer(alike, pitch, nodes, position, (0, 1, 2)))
+    return [each[list(axes)] for each in whole]
+
+
+def _of_a_layer(
+    gel: Gel, pitch: float, nodes: Sequence[FloatArray], position: FloatArray, axes: Sequence[int]
+) -> list[FloatArray]:
+    """Of one that is alike everywhere."""
     cells, finer = RESPONSE.cells, RESPONSE.finer
     offsets, places = zip(*(_offsets(position, each, pitch / cells) for each in nodes), strict=True)
     close = RESPONSE.near * cells

@@ -4,6 +4,7 @@ import numpy as np
 
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.response import response_matrices
+from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.frames import FloatArray, GraspLog
 from slipcore.surface.strain import Lattice, lattice_steps
 
@@ -17,7 +18,8 @@ def at_points(log: GraspLog, gel: Gel, force: FloatArray) -> FloatArray:
     known, nor how far friction keeps them from swelling under the object.
     """
     place = log.position[..., :2].reshape(-1, 2)
-    (response,) = response_matrices(gel, float(np.sqrt(log.element_area)), [place], place)
+    pitch, uneven = float(np.sqrt(log.element_area)), UnevenLayer.of(gel, log.position)
+    (response,) = response_matrices(gel, pitch, [place], place, uneven=uneven)
     pressure = -force[..., 2].reshape(len(log), -1) / log.element_area
     moved = np.einsum("aje,te->tja", response[:, :, 2], pressure).reshape(*force.shape) * [1.0, 1.0, -1.0]
     rows, columns = Lattice.at_rest(log.position).inverse_jacobian

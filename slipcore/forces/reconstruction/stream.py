@@ -12,6 +12,7 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows, seen_along
 from slipcore.forces.tracking.frame_forces import FrameForces
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
@@ -68,6 +69,7 @@ class ForceStream:
             raise InvalidInput("element_area", element_area, "above 0 m², finite")
         if noise is not None:
             check_noise(noise)
+        UnevenLayer.of(gel, place)  # so that a map of another lattice is refused here, and not by a look
         self.nodes = len(Nodes.around(place[..., :2].reshape(-1, 2), element_area))
         """On which traction is sought: a look takes time with their cube, and memory with their square."""
         self.held_bytes = bytes_needed(place, element_area)

@@ -10,6 +10,7 @@ from slipcore.forces.inverse.prior import Smoothness, of_depth_alone, usual
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.response import response_matrices
+from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.forces.recording import least_power
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.frames import BoolArray, FloatArray
@@ -43,9 +44,10 @@ class SensorResponse:
         place = position[..., :2].reshape(-1, 2)
         nodes, young = Nodes.around(place, element_area), gel.young_modulus
         load, between = young * nodes.area, nodes.between
+        sources, uneven = (nodes.places(), between.places()), UnevenLayer.of(gel, position)
         at_nodes, midway = (
             _observed(young * response, load)
-            for response in response_matrices(gel, nodes.grid.pitch[0], (nodes.places(), between.places()), place, axes)
+            for response in response_matrices(gel, nodes.grid.pitch[0], sources, place, axes, uneven)
         )
         elements = young * nodes.over_elements(place)
         under = at_nodes[:-3, :, elements.any(axis=0)]

@@ -97,3 +97,23 @@ def test_sensors_are_told_to_a_program_as_the_service_has_them(client: Mock, cap
     client.sensors.return_value = [{"name": "left", "gel": None}]
     assert run("list", "--json") == 0
     assert json.loads(capsys.readouterr().out) == {"sensors": [{"name": "left", "gel": None}]}
+
+
+def test_a_map_of_the_thickness_is_read_from_a_file_and_told(client: Mock, capsys: Capture, tmp_path: Path) -> None:
+    path = tmp_path / "map.json"
+    path.write_text("[[1, 0.5], [0.75, 1]]")
+    given = ("--young-modulus", "2e5", "--poisson-ratio", "0.48", "--thickness", "0.004")
+    assert run("describe", "dome", *given, "--relative-thickness", str(path)) == 0
+    client.describe_sensor.assert_called_once_with("dome", 2e5, 0.48, 4e-3, 0.0, [[1.0, 0.5], [0.75, 1.0]])
+    gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 0.0}
+    client.sensors.return_value = [{"name": "dome", "gel": gel | {"relative_thickness": [[1.0, 0.5], [0.75, 1.0]]}}]
+    assert run("list") == 0
+    assert "0.00200 … 0.00400" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("content", ["", "1", "[1, 2]", '[["a"]]'])
+def test_a_map_that_is_none_is_refused(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "map.json"
+    path.write_text(content)
+    with pytest.raises(BadParameter, match=r"--relative-thickness of .*; allowed: \[\[1"):
+        sensors._rows_of(path)

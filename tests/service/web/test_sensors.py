@@ -1,3 +1,4 @@
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
@@ -160,3 +161,16 @@ def test_findings_are_counted_by_the_logs_that_they_were_made_against(kind: Any)
     found = None if kind is None else tuple(SimpleNamespace(name=name) for name in kind)
     logs: Any = [SimpleNamespace(detection=SimpleNamespace(findings=found))] * 2 + [SimpleNamespace(detection=None)]
     assert count_findings(logs) == [(name, 2) for name in kind or ()]
+
+
+def test_the_form_keeps_a_map_of_the_thickness(session_of: Any, database: Database) -> None:
+    """Which it has no field for; the page tells how thick the gel is by it."""
+    uneven = Gel(2.5e5, 0.48, 4e-3, 5e-4, ((1.0, 0.9), (0.75, 1.0)))
+    with database.write() as session:
+        sensors.describe(session, "dome", uneven)
+    admin = session_of("admin")
+    assert ", by its map 0.75" in admin.get(path_of("dome")).text
+    assert admin.request("POST", path_of("dome"), data=SENT | {"thickness": "5e-3"}).status_code == 303
+    assert gel(database, "dome") == replace(uneven, thickness=5e-3)
+    refused = admin.request("POST", path_of("dome"), data=SENT | {"thickness": "6e-4"})
+    assert (refused.status_code, "marker_depth below the thickness everywhere" in refused.text) == (422, True)

@@ -28,7 +28,13 @@ from stiction_client import FrictionClient, calls
 from stiction_client.container import encode
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
-GEL = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
+GEL = {
+    "young_modulus": 2.5e5,
+    "poisson_ratio": 0.48,
+    "thickness": 4e-3,
+    "marker_depth": 5e-4,
+    "relative_thickness": None,
+}
 
 
 @pytest.mark.parametrize("name", ["Gel Sight", "a/b", "hand/left/", "?#%2F"])
@@ -42,6 +48,7 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
         "poisson_ratio": 0.49,
         "thickness": None,
         "marker_depth": 0.0,
+        "relative_thickness": None,
     }
     assert client.put(path, json=GEL).json() == {"name": name, "gel": GEL, "calibration": None}
     assert client.get(path).json()["gel"] == GEL
@@ -49,6 +56,17 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
     told = client.get("/v1/audit", params={"subject": name}).json()["items"]
     assert [entry["action"] for entry in told] == ["sensor.described"] * 2
     assert told[0]["details"] == GEL
+
+
+def test_a_gel_that_is_not_alike_thick_has_a_map(client: httpx.Client) -> None:
+    """It is what the sensor's logs are looked at by, so one with another map is another description."""
+    uneven = GEL | {"relative_thickness": [[1.0, 0.9, 0.8], [1, 0.95, 0.9]]}
+    described = client.put("/v1/sensors/dome", json=uneven)
+    assert described.json()["gel"] == uneven
+    assert client.put("/v1/sensors/dome", json=uneven).json() == described.json()
+    changes = client.get("/v1/audit", params={"subject": "dome"}).json()["items"]
+    assert [entry["details"] for entry in changes] == [uneven]
+    assert client.put("/v1/sensors/dome", json=GEL).json()["gel"] == GEL
 
 
 def test_a_list_of_sensors_comes_in_parts(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,6 +96,11 @@ def test_a_list_of_sensors_comes_in_parts(client: httpx.Client, monkeypatch: pyt
         {"marker_depth": -1e-3},
         {"hardness": 20.0},
         {"young_modulus": None},
+        {"relative_thickness": [[1.0, 0.9]]},
+        {"relative_thickness": [[1.0, 0.9], [1.0]]},
+        {"relative_thickness": [[1.0, 0.9], [1.0, 0.2]]},
+        {"relative_thickness": [[1.0, 1.0], [1.0, 0.9]], "thickness": None},
+        {"relative_thickness": [[1.0, 1.0], [1.0, 0.9]], "marker_depth": 3.8e-3},
     ],
 )
 def test_an_impossible_gel_is_refused(client: httpx.Client, change: dict[str, Any]) -> None:
@@ -568,7 +591,7 @@ def test_sensors_are_listed_by_name_with_their_gels(reach: Callable[..., Any], d
         sensors.find_or_add(session, "right")
         sensors.describe(session, "left", Gel(2e5, 0.48, None, 5e-4))
     told = reach("open").get("/v1/sensors").json()["items"]
-    gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 5e-4}
+    gel = GEL | {"young_modulus": 2e5, "thickness": None}
     assert told == [
         {"name": "left", "gel": gel, "calibration": None},
         {"name": "right", "gel": None, "calibration": None},
