@@ -253,6 +253,7 @@ def test_what_sticks_and_is_taken_for_slip_asks_for_no_more_than_samples_show(
     """A stick ratio of 0.2 under a tenth of the normal force shows a friction of 0.11."""
     state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
     told = None if sampled is None else SlipSamples(np.full(100, sampled), np.full(100, 0.05))
+    state, _ = GraspController.step(state, Observation(0.0, 0.5, 0.1, 0.0, 1.0))
     for frame in range(1, 10):
         load = 0.1 + 0.05 * frame
         state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, load, 0.0, 0.2, told))
@@ -670,3 +671,14 @@ def test_a_load_that_is_taken_away_shows_no_less_friction_than_was_borne_before(
         normal = command.normal_force
     assert state.known is not None
     assert state.known.expected(5.0) > 1.5 / 4.0
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(("pressed", "first"), [(8.0, 8.0), (0.2, 0.5), (50.0, 40.0)])
+def test_a_controller_takes_over_a_grip_as_hard_as_it_is(
+    pressed: float, first: float, known: bool, make_model: Make
+) -> None:
+    """It does not let go of what is held, to grip it anew."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45) if known else None)
+    _, command = GraspController.step(state, Observation(0.0, pressed, 0.05, 0.0, 1.0))
+    assert command.normal_force == first

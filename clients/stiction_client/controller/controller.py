@@ -76,13 +76,21 @@ def step(state: ControllerState, observation: Observation) -> tuple[ControllerSt
     Raises ``InvalidArgument`` for an observation that cannot be; the state before it can still be used.
     """
     check(observation, state.time)
-    elapsed = observation.time - state.time
+    state, elapsed = _taken_over(state, observation), observation.time - state.time
     seen = _decide(_sense(state, observation, elapsed), observation)
     demand = max(_demands(seen, observation), key=lambda each: each.force)
     force = _limited(seen, demand.force, elapsed)
     limited = demand.force > state.settings.most_force
     reason = f"{demand.reason}, more than most_force" if limited else demand.reason
     return replace(seen, normal_force=force), Command(force, seen.mode, reason, seen.material, seen.probability)
+
+
+def _taken_over(state: ControllerState, observation: Observation) -> ControllerState:
+    """With the force that a gripper already presses with in the first frame, from which commands then go on."""
+    if math.isfinite(state.time):
+        return state
+    pressed = min(observation.normal, state.settings.most_force)
+    return replace(state, normal_force=max(state.normal_force, pressed))
 
 
 def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
