@@ -1,6 +1,7 @@
 """Forces on micro-elements from the displacement of markers, for sensors that measure no forces."""
 
 from slipcore.forces.gel_calibration.calibrate import GelCalibration, GelEstimate, calibrate_gel
+from slipcore.forces.inverse.kernel import ResolutionKernel
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.reconstruction.comparison import Agreement, ForceComparison, compare_forces
 from slipcore.forces.reconstruction.stream import ForceStream, StreamedForces
@@ -16,6 +17,7 @@ __all__ = [
     "GelCalibration",
     "GelEstimate",
     "Reconstruction",
+    "ResolutionKernel",
     "StreamedForces",
     "calibrate_gel",
     "compare_forces",

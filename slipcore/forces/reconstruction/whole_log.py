@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel
+from slipcore.forces.inverse.kernel import ResolutionKernel
 from slipcore.forces.inverse.strength import Criterion
 from slipcore.forces.inverse.whole_lattice import WholeLattice
 from slipcore.forces.operator.gel import Gel
@@ -38,7 +39,8 @@ class Reconstruction:
     [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN);
     ``saturated`` [t, n, m, 3]: displacements at the end of the sensor's range, taken as not seen; ``unnoticed`` [3] N:
     forces that would move markers by no more than noise, as which nothing is taken where nothing touches;
-    ``shows_pressure``: False for markers in the plane on so thick a gel that they do not show where it presses.
+    ``shows_pressure``: False for markers in the plane on so thick a gel that they do not show where it presses;
+    ``kernel``: what each element's force averages over, at that same frame; None without contact.
     """
 
     force: FloatArray
@@ -58,6 +60,7 @@ class Reconstruction:
     saturated: BoolArray
     unnoticed: FloatArray
     shows_pressure: bool = True
+    kernel: ResolutionKernel | None = None
 
     @property
     def contradicted(self) -> float:
@@ -157,11 +160,14 @@ def _followed(
     if not touched.any():
         return result, lattice
     tracker = Tracker.of(sensor, *recording.frame(strongest), criterion, lattice)
+    fit, observation = tracker.key.fit, tracker.key.observation
+    shares = (sensor.elements / sensor.load).reshape(*log.grid, -1)
     result = replace(
         result,
-        information=tracker.key.fit.information(),
-        condition=tracker.key.observation.condition(tracker.key.fit.support),
-        kernel_width=tracker.key.fit.kernel_width(tracker.key.observation, sensor.nodes.grid.pitch[0]),
+        kernel=ResolutionKernel(fit, observation, sensor.nodes.places()[fit.support], shares),
+        information=fit.information(),
+        condition=observation.condition(fit.support),
+        kernel_width=fit.kernel_width(observation, sensor.nodes.grid.pitch[0]),
     )
     for way in (range(strongest, len(log)), range(strongest - 1, -1, -1)):
         now, reader = tracker, Reader.of(sensor, tracker.key)

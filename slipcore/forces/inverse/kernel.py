@@ -1,0 +1,42 @@
+"""Of what the force found on an element is made: rows of the resolution (averaging) kernel.
+
+What a fit gives is linear in the data, and these in the true traction, so that a row says how much of a force at each
+place is taken up in the force found on one element (Backus and Gilbert, Geophys. J. R. Astron. Soc. 16 (1968) 169).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slipcore.errors import InvalidInput
+from slipcore.forces.inverse.fit import ObservationModel, TractionFit
+from slipcore.frames import FloatArray
+
+OUTWARD = np.array([1.0, 1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResolutionKernel:
+    """Of the ``fit`` to one ``observation``: ``places`` [k, 2] m of the nodes in contact, and ``shares`` [n, m, nodes]
+    of the load of each node of the lattice that each element bears.
+    """
+
+    fit: TractionFit
+    observation: ObservationModel
+    places: FloatArray
+    shares: FloatArray
+
+    def row(self, row: int, column: int) -> FloatArray:
+        """How much of a force at each of the ``places``, along each axis (last), is taken up in that found on one
+        element along each axis (first): [3, k, 3], z outward. Raises ``InvalidInput`` for an element there is not.
+
+        One product of three vectors with the operator and one with the response; the dense kernel is never made.
+        """
+        n, m, _ = self.shares.shape
+        if not (0 <= row < n and 0 <= column < m):
+            raise InvalidInput("element", [row, column], f"one of {n} × {m}")
+        support, response = self.fit.support, self.observation.response
+        borne = self.shares[row, column, support]
+        by_data = np.stack([borne @ of_axis for of_axis in np.split(self.fit.operator, 3)])
+        taken = (by_data @ response.reshape(len(response), -1)).reshape(3, 3, -1)[..., support]
+        return np.asarray(taken.transpose(0, 2, 1) * OUTWARD[:, None, None] * OUTWARD)
