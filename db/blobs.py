@@ -175,9 +175,12 @@ class BlobStore:
             return list(self._spool.iterdir())
 
     def clear_spool(self) -> None:
-        """Remove what was under way when its process ended; only for one who works in the folder alone."""
+        """Remove what was under way when its process ended; only for one who works in the folder alone.
+
+        What a command beside it holds, as of a restore, stays.
+        """
         for path in self.under_way():
-            _remove(path)
+            self.remove_unheld(path)
 
     def remove_unheld(self, path: Path) -> bool:
         """Remove one of those unless a process holds it as its ``Spool``; whether it did. Nobody holds a folder."""
