@@ -185,6 +185,8 @@ class NumericsDefaults(Options):
     """Allowed beside what linear theory of a rotation makes."""
     yaw_variance: Annotated[float, Option(0.0, 1e-4, "rad²", "rounding of a fit of many points")] = 1e-16
     """The same of a given pose's yaw."""
+    open_yaw: Annotated[float, Option(1.0, 1e3, "-", "what sticks is a third as wide as the contact")] = 10.0
+    """Variance by yaw over that by place, from which on a fit leaves the yaw open; 1 where all sticks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,9 @@ from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
 
-_LEAST_SPREAD, _STRETCH_VARIANCE, _YAW_VARIANCE = (
+_LEAST_SPREAD, _OPEN_YAW, _STRETCH_VARIANCE, _YAW_VARIANCE = (
     NUMERICS.least_spread,
+    NUMERICS.open_yaw,
     NUMERICS.stretch_variance,
     NUMERICS.yaw_variance,
 )
@@ -157,6 +158,32 @@ def find_pose(
 
 
 @compiled
+def _without_open_yaw(
+    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float
+) -> tuple[Pose, PoseVariance]:
+    """The pose with the yaw of the reference, turned back about the place that is known best, where the few elements
+    that stick leave it open: where most of the variance of what the anchors are moved by is the yaw's, and this is
+    within ``play`` standard deviations of the reference's.
+
+    All that moves would else count as jitter of the yaw, also what the place shows far beyond its own variance.
+    """
+    turn = math.atan2(math.sin(pose.yaw - reference.yaw), math.cos(pose.yaw - reference.yaw))
+    arm = 0.0
+    for e in range(len(anchors.x)):
+        px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
+        arm += (px - spread.x) ** 2 + (py - spread.y) ** 2
+    is_open = spread.yaw * arm > _OPEN_YAW * len(anchors.x) * spread.place
+    if not is_open or turn * turn > play * play * spread.yaw:
+        return pose, spread
+    x, y = place_on_object(pose, spread.x, spread.y)
+    turned = pose_at(0.0, 0.0, reference.yaw, pose.stretch)
+    dx, dy = place_of_object(turned, x, y)
+    return pose_at(spread.x - dx, spread.y - dy, reference.yaw, pose.stretch), PoseVariance(
+        spread.place, 0.0, spread.x, spread.y
+    )
+
+
+@compiled
 def object_motion(
     anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float, motion: AnchorMotion
 ) -> Pose:
@@ -168,6 +195,7 @@ def object_motion(
     counts, however many frames it is cut into, and of a jitter nothing.
     """
     count = len(anchors.x)
+    pose, spread = _without_open_yaw(anchors, reference, pose, spread, play)
     cosine, sine = pose.cosine, pose.sine
     strayed = jitter = 0.0
     for e in range(count):

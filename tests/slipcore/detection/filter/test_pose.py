@@ -89,3 +89,28 @@ def test_of_a_motion_is_left_what_its_jitter_does_not_explain(moved: float, kept
     np.testing.assert_allclose(motion.x, kept * moved, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(motion.variance, 4e-12, rtol=1e-12)
     assert reference.x == pytest.approx(kept * moved, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("yaw_deviation", "turn", "held"),
+    [(5e-3, 4e-3, True), (5e-3, 6e-3, False), (1e-4, 0.9e-4, False)],
+    ids=["open", "far beyond its deviation", "known nearly as well as the place"],
+)
+def test_a_yaw_that_few_markers_leave_open_is_held_and_hides_no_motion(
+    yaw_deviation: float, turn: float, held: bool
+) -> None:
+    """Known to 2 µm at the corner at which two elements stick; held, it is seen to move by 20 µm, less a tenth."""
+    places, motion = anchors(0.0, 1.0), AnchorMotion(*np.empty((3, 16)))
+    spread = PoseVariance(4e-12, yaw_deviation**2, 5e-3, 5e-3)
+    start, turned = pose_at(0.0, 0.0, 0.0, 1.0), pose_at(0.0, 0.0, turn, 1.0)
+    x, y = place_of_object(turned, 5e-3, 5e-3)
+    end = pose_at(5e-3 + 20e-6 - x, 5e-3 - y, turn, 1.0)  # the corner moves along x
+    reference = object_motion(places, start, end, spread, 1.0, motion)
+    if held:
+        np.testing.assert_allclose(motion.x, 0.9 * 20e-6, rtol=1e-4)
+        np.testing.assert_allclose(motion.y, 0.0, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(motion.variance, 4e-12, rtol=1e-12)
+        assert reference.yaw == 0.0
+    else:
+        assert np.ptp(motion.variance) > 0.0
+        assert reference.yaw != 0.0 or not motion.x.any()
