@@ -186,9 +186,9 @@ STATED = {
     ),
     "jobs.md": (
         f"logs of more than a million element-frames or {upload.LONG_FRAMES:,} frames",
-        f"A material has at most {curate.MOST_ALIASES} aliases and {ownership.MOST_OWNERS} owners",
+        f"a material has at most {curate.MOST_ALIASES} aliases and {ownership.MOST_OWNERS} owners",
         f"`auto` looks at the samples as well while there are at most {pipeline.SAMPLED_AT_INGEST} logs",
-        f"CPU time {WORDS[round(1.0 / process_executor.WATCH_SECONDS)]} times a second",
+        f"the runner looks at the worker process's {WORDS[round(1.0 / process_executor.WATCH_SECONDS)]} times a second",
     ),
     "problems.md": (
         f"`errors` lists the first {errors.MOST_TOLD}",
@@ -215,7 +215,7 @@ STATED = {
         f"| {exit_codes.INTERRUPTED} | interrupted (Ctrl-C)",
     ),
     "client.md": (
-        f"Requests wait at most {client.TIMEOUT:g} s (`timeout=`)",
+        f"requests wait at most {client.TIMEOUT:g} s (`timeout=`)",
         f"is tried {WORDS[calls.ATTEMPTS]} times",
         f"not if that is later than in {calls.LONGEST_RETRY:g} s",
         f"a conservative quantile of μ ({coulomb.QUANTILE:g} by default",

@@ -12,7 +12,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from service.domain.calibrate import CORRECTED_BY_ANOTHER
-from service.domain.reconstruct import BY_ANOTHERS_GEL, CONTRADICTED, RECONSTRUCTED
+from service.domain.reconstruct import BY_ANOTHERS_GEL, CONTRADICTED, NOT_CHECKED, RECONSTRUCTED
 from slipcore import Finding, GraspLog, InvalidInput, check_log, collect_friction, detect_slip
 from slipcore.checks import AGAINST_FRICTION
 from slipcore.checks.contact import _load_ratio
@@ -516,6 +516,7 @@ def findings_in_code() -> set[str]:
         LATE,
         EARLY,
         RECONSTRUCTED,
+        NOT_CHECKED,
         CONTRADICTED,
         CORRECTED_BY_ANOTHER,
         BY_ANOTHERS_GEL,

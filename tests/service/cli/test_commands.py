@@ -960,7 +960,8 @@ def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: s
     assert re.search(r"GelSight Mini +250000 +0\.480 +0\.00400 +0", listed)
     every = json.loads(run("sensors", "list", "--json", "--url", url)[1])["sensors"]
     (told,) = (each for each in every if each["name"] == "GelSight Mini")
-    assert told["gel"] == {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 0.004, "marker_depth": 0.0}
+    even = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 0.004, "marker_depth": 0.0}
+    assert told["gel"] == even | {"relative_thickness": None}
     assert run("sensors", "describe", "GelSight Mini", *gel[:-1], "-1", "--url", url)[0] == SERVICE_REFUSED
 
 

@@ -269,7 +269,7 @@ def test_sensors_are_listed_thick_where_no_contact_feels_their_base(client: Mock
     assert left == ["left", "250000", "0.480", "thick", "0.000500"]
     assert right == ["right"]
     told = say("sensors", "describe", "left", "--young-modulus", "1e5", "--poisson-ratio", "0.4")
-    client.describe_sensor.assert_called_once_with("left", 1e5, 0.4, None, 0.0)
+    client.describe_sensor.assert_called_once_with("left", 1e5, 0.4, None, 0.0, None)
     assert told.startswith("left is described: ")
 
 
