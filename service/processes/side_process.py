@@ -11,7 +11,7 @@ import struct
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from itertools import count
 from multiprocessing.context import SpawnProcess
@@ -123,11 +123,16 @@ def _work(line: socket.socket, chosen: logs.Logs | None) -> None:
         with one_by_one:
             line.sendall(LENGTH.pack(len(content)) + content)
 
+    def end_if_it_failed(done: Future[None]) -> None:
+        if done.exception() is not None:  # its answer cannot be sent, and nobody shall wait for it
+            with suppress(OSError):  # whose other end may be gone
+                line.shutdown(socket.SHUT_RDWR)
+
     with line, ThreadPoolExecutor(1, "long_calls") as long, suppress(EOFError, ConnectionError):
         while True:
             call = _receive(line)
             if call.is_long:
-                long.submit(do, call)
+                long.submit(do, call).add_done_callback(end_if_it_failed)
             else:
                 do(call)
 

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import threading
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -99,5 +100,16 @@ def test_no_call_waits_for_one_that_is_long_and_those_wait_for_each_other() -> N
         await long[0]
         assert not long[1].done()
         await long[1]
+
+    with_process(body)
+
+
+@pytest.mark.parametrize("is_long", [False, True])
+def test_an_answer_that_cannot_be_sent_ends_the_process_and_leaves_nobody_waiting(is_long: bool) -> None:
+    async def body(process: SideProcess) -> None:
+        answer = asyncio.create_task(process.call(threading.Lock, is_long=is_long))
+        done, _ = await asyncio.wait({answer}, timeout=20.0)
+        assert done
+        assert isinstance(answer.exception(), ProcessEnded)
 
     with_process(body)
