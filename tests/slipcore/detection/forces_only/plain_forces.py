@@ -7,6 +7,8 @@ from scipy.special import expit
 
 from slipcore.defaults import NUMERICS, ForcesOnlyOptions
 from slipcore.detection.filter.loading import low_pass
+from slipcore.detection.forces_only.method import init
+from slipcore.detection.forces_only.sharing import Sharing
 from slipcore.detection.forces_only.step import ForcesState
 from slipcore.detection.forces_only.tuning import frictions, prior
 from slipcore.detection.shared.interface import ObservedFrame
@@ -59,21 +61,6 @@ class Loads(NamedTuple):
         return arm, float((self.normal[:, None] * arm**2).sum()) + NUMERICS.least_spread
 
 
-class Sharing(NamedTuple):
-    """What a change of the load says of elements [k]: their force ``ratio``, and its ``deviation``; the ``part`` of the
-    change of that ratio over what an element takes that goes on sharing as it did, with its ``part_deviation``; the
-    change ``expected`` of it if the load were shared evenly, below 0 where it is taken back; whether the ratio
-    ``falls``.
-    """
-
-    ratio: FloatArray
-    deviation: FloatArray
-    part: FloatArray
-    part_deviation: FloatArray
-    expected: FloatArray
-    falls: BoolArray
-
-
 def compare(before: Loads, now: Loads, noise: float, options: ForcesOnlyOptions) -> Sharing:
     """How elements shared the change from ``before`` to ``now``; ``noise`` of one component of force, N."""
     ratio, even = now.ratio, now.evenly
@@ -119,12 +106,6 @@ def _or_anything(density: FloatArray, seen: Sharing, options: ForcesOnlyOptions)
     anything = log_density(seen.part, 1.0, np.hypot(1.0, seen.part_deviation))
     mixed: FloatArray = np.logaddexp(np.log1p(-share) + density, np.log(share) + anything)
     return mixed
-
-
-def init(lattice: Lattice, options: ForcesOnlyOptions) -> ForcesState:
-    """Nothing touches yet."""
-    nothing, vectors = np.zeros(lattice.position.shape[:2]), np.zeros(lattice.position.shape)
-    return ForcesState(nothing, vectors, nothing, vectors, nothing > 0.0, nothing, prior(options), nothing)
 
 
 def step(
