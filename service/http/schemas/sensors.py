@@ -56,7 +56,6 @@ class GelIn(Body):
         Field(ge=1e-6, le=1.0, description="m from the surface to the rigid base; null: thick against any contact"),
     ] = None
     marker_depth: Annotated[float, Field(ge=0.0, lt=1.0, description="m of the markers below the surface")] = 0.0
-
     relative_thickness: Annotated[
         list[ThicknessRow] | None,
         Field(min_length=2, max_length=64, description=UNEVEN),
