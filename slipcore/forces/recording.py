@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
+from slipcore.forces.operator.gel import OUTWARD
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.saturation import saturated
 
@@ -54,7 +55,7 @@ def axes_seen(displacement: FloatArray) -> tuple[int, ...]:
 
 def rows(displacement: FloatArray, seen: BoolArray, axes: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
     """Data [t, m] m of displacements [t, n, m, 3] along some axes, z into the gel, and which were ``seen``, alike."""
-    return _by_axis(displacement * [1.0, 1.0, -1.0], axes), _by_axis(seen, axes)
+    return _by_axis(displacement * OUTWARD, axes), _by_axis(seen, axes)
 
 
 def seen_along(observed: BoolArray | None, at_end: BoolArray) -> BoolArray:

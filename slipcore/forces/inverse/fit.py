@@ -98,9 +98,8 @@ class TractionFit:
         """How true tractions are averaged in those found by data of this ``response`` [m, 3 j]: shear along its own
         axis (the mean of both), and pressure, [2, j, j].
         """
-        j = self.prior_root.shape[1]
-        own = [self.operator[part] @ response[:, part] for part in (slice(k * j, (k + 1) * j) for k in range(3))]
-        return np.stack((0.5 * (own[0] + own[1]), own[2]))
+        x, y, normal = self._along_each_axis(response)
+        return np.stack((0.5 * (x + y), normal))
 
     def information(self) -> FloatArray:
         """Share [3] of what is known of the resultant along each axis that comes from the data, not the prior."""
@@ -113,15 +112,18 @@ class TractionFit:
         tangential and normal direction.
         """
         response = observation.response[:, :, self.support].reshape(len(observation.noise), -1)
-        resolution = (self.operator @ response).reshape(3, -1, *self.prior_root.shape[:2])
         widths = []
-        for axis in range(3):
-            row = resolution[axis, :, axis]
+        for row in self._along_each_axis(response):
             squared = np.sum(row**2, axis=1)
             known = squared > 0.0
             cells = np.sum(row, axis=1)[known] ** 2 / squared[known]
             widths.append(float(np.sqrt(np.median(cells))) if known.any() else np.inf)
         return pitch * max(1.0, *widths)
+
+    def _along_each_axis(self, response: FloatArray) -> list[FloatArray]:
+        """How much of true traction along an axis is taken up in that found along the same, [j, j] each."""
+        parts = zip(np.split(self.operator, 3), np.split(response, 3, axis=1), strict=True)
+        return [operator @ along for operator, along in parts]
 
 
 def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: TractionPrior) -> TractionFit:

@@ -10,21 +10,21 @@ import numpy as np
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.inverse.fit import ObservationModel, TractionFit
+from slipcore.forces.operator.gel import OUTWARD
 from slipcore.frames import FloatArray
-
-OUTWARD = np.array([1.0, 1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResolutionKernel:
-    """Of the ``fit`` to one ``observation``: ``places`` [k, 2] m of the nodes in contact, and ``shares`` [n, m, nodes]
-    of the load of each node of the lattice that each element bears.
+    """Of the ``fit`` to one ``observation``: ``places`` [k, 2] m of the nodes in contact, and what each
+    element bears, ``elements`` [n, m, nodes] N, of the ``load`` N of each node of the lattice.
     """
 
     fit: TractionFit
     observation: ObservationModel
     places: FloatArray
-    shares: FloatArray
+    elements: FloatArray
+    load: float
 
     def row(self, row: int, column: int) -> FloatArray:
         """How much of a force at each of the ``places``, along each axis (last), is taken up in that found on one
@@ -32,11 +32,11 @@ class ResolutionKernel:
 
         One product of three vectors with the operator and one with the response; the dense kernel is never made.
         """
-        n, m, _ = self.shares.shape
+        n, m, _ = self.elements.shape
         if not (0 <= row < n and 0 <= column < m):
             raise InvalidInput("element", [row, column], f"one of {n} × {m}")
         support, response = self.fit.support, self.observation.response
-        borne = self.shares[row, column, support]
+        borne = self.elements[row, column, support] / self.load
         by_data = np.stack([borne @ of_axis for of_axis in np.split(self.fit.operator, 3)])
         taken = (by_data @ response.reshape(len(response), -1)).reshape(3, 3, -1)[..., support]
         return np.asarray(taken.transpose(0, 2, 1) * OUTWARD[:, None, None] * OUTWARD)

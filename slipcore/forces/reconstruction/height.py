@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.gel import OUTWARD, Gel
 from slipcore.forces.operator.response import response_matrices
 from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.frames import FloatArray, GraspLog
@@ -21,7 +21,7 @@ def at_points(log: GraspLog, gel: Gel, force: FloatArray) -> FloatArray:
     pitch, uneven = float(np.sqrt(log.element_area)), UnevenLayer.of(gel, log.position)
     (response,) = response_matrices(gel, pitch, [place], place, uneven=uneven)
     pressure = -force[..., 2].reshape(len(log), -1) / log.element_area
-    moved = np.einsum("aje,te->tja", response[:, :, 2], pressure).reshape(*force.shape) * [1.0, 1.0, -1.0]
+    moved = np.einsum("aje,te->tja", response[:, :, 2], pressure).reshape(*force.shape) * OUTWARD
     rows, columns = Lattice.at_rest(log.position).inverse_jacobian
     risen = log.displacement[..., 2].copy()
     for t, frame in enumerate(moved):

@@ -161,10 +161,10 @@ def _followed(
         return result, lattice
     tracker = Tracker.of(sensor, *recording.frame(strongest), criterion, lattice)
     fit, observation = tracker.key.fit, tracker.key.observation
-    shares = (sensor.elements / sensor.load).reshape(*log.grid, -1)
+    places, elements = sensor.nodes.places()[fit.support], sensor.elements.reshape(*log.grid, -1)
     result = replace(
         result,
-        kernel=ResolutionKernel(fit, observation, sensor.nodes.places()[fit.support], shares),
+        kernel=ResolutionKernel(fit, observation, places, elements, sensor.load),
         information=fit.information(),
         condition=observation.condition(fit.support),
         kernel_width=fit.kernel_width(observation, sensor.nodes.grid.pitch[0]),

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.tracking.known import OUTWARD, KnownForce
+from slipcore.forces.operator.gel import OUTWARD
+from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
 from slipcore.forces.tracking.unresolved import Unresolved
@@ -107,20 +108,19 @@ class Reader:
         """Forces of a frame's ``data`` [m] m on elements of this grid; what the fit leaves unexplained beyond noise
         widens their deviations.
         """
-        outward = np.array([1.0, 1.0, -1.0])
         traction = self.key.fit.traction(data)
         misfit = self._misfit(traction, data)
         of_elements, of_wrench = self._deviations(traction, data, misfit)
         wrench = self._wrench(traction)
-        force = ((self.elements @ traction.T) * outward).reshape(*grid, 3)
+        force = ((self.elements @ traction.T) * OUTWARD).reshape(*grid, 3)
         largest = RECONSTRUCTION.element_error * np.abs(force).max()
         by_noise = np.hypot(misfit * self.deviation[2].reshape(grid), largest)
         covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * self.sensor.load
         return FrameForces(
             force,
             np.hypot(of_elements.T.reshape(force.shape), largest),
-            (self._averaged_alike(traction) @ self.elements.T).T.reshape(force.shape) * outward,
-            wrench[:3] * outward,
+            (self._averaged_alike(traction) @ self.elements.T).T.reshape(force.shape) * OUTWARD,
+            wrench[:3] * OUTWARD,
             of_wrench[:3],
             float(wrench[3]),
             float(of_wrench[3]),

@@ -8,11 +8,8 @@ from numpy.typing import ArrayLike
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.gel import OUTWARD, Gel
 from slipcore.frames import BoolArray, FloatArray
-
-OUTWARD = np.array([1.0, 1.0, -1.0])
-"""From the gel's frame, z into it, to the sensor's, and back."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

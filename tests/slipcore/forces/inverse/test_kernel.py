@@ -33,7 +33,7 @@ def test_a_row_is_that_of_the_dense_kernel() -> None:
     k = len(kernel.places)
     support = kernel.fit.support
     dense = kernel.fit.operator @ kernel.observation.response[..., support].reshape(-1, 3 * k)
-    over = np.einsum("nmk,akbl->nmalb", kernel.shares[..., support], dense.reshape(3, k, 3, k))
+    over = np.einsum("nmk,akbl->nmalb", kernel.elements[..., support] / kernel.load, dense.reshape(3, k, 3, k))
     outward = np.array([1.0, 1.0, -1.0])
     for element in ((4, 4), (3, 5), (0, 0)):
         expected = over[element] * outward[:, None, None] * outward
@@ -45,7 +45,7 @@ def test_a_row_is_that_of_the_dense_kernel() -> None:
 def test_with_next_to_no_noise_an_element_shows_its_own_force_alone() -> None:
     """To a tenth of the largest share: what lies between nodes counts as noise, too."""
     kernel = kernel_of(found(0.0))
-    row, own = kernel.row(4, 4), kernel.shares[4, 4, kernel.fit.support]
+    row, own = kernel.row(4, 4), kernel.elements[4, 4, kernel.fit.support] / kernel.load
     for axis in range(3):
         np.testing.assert_allclose(row[axis, :, axis], own, rtol=0.0, atol=0.1 * own.max())
         others = np.delete(row[axis], axis, axis=1)
