@@ -8,9 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.operator.gel import OUTWARD
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.saturation import saturated
+
+OUTWARD = np.array([1.0, 1.0, -1.0])
+"""From the gel's frame, z into it, to the sensor's, and back."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

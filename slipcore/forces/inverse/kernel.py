@@ -10,7 +10,7 @@ import numpy as np
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.inverse.fit import ObservationModel, TractionFit
-from slipcore.forces.operator.gel import OUTWARD
+from slipcore.forces.recording import OUTWARD
 from slipcore.frames import FloatArray
 
 

@@ -5,13 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-import numpy as np
-
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import GEL
-
-OUTWARD = np.array([1.0, 1.0, -1.0])
-"""From the gel's frame, z into it, to the sensor's, and back."""
 
 
 @dataclass(frozen=True, slots=True)

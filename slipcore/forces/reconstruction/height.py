@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from slipcore.forces.operator.gel import OUTWARD, Gel
+from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.response import response_matrices
 from slipcore.forces.operator.uneven import UnevenLayer
+from slipcore.forces.recording import OUTWARD
 from slipcore.frames import FloatArray, GraspLog
 from slipcore.surface.strain import Lattice, lattice_steps
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.operator.gel import OUTWARD
+from slipcore.forces.recording import OUTWARD
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.operator.gel import OUTWARD, Gel
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.recording import OUTWARD
 from slipcore.frames import BoolArray, FloatArray
 
 
