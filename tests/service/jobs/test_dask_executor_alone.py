@@ -14,6 +14,7 @@ from service.jobs import dask_executor, worker
 from service.jobs.dask_executor import DaskExecutor
 from service.jobs.executor import WorkerDied
 from service.jobs.worker import StoreConfig
+from tests.sleeping import replace_sleep
 
 LAST: Any = SimpleNamespace(address="tcp://b:2")
 CONFIG = StoreConfig("sqlite:///x", Path("there"))
@@ -96,7 +97,7 @@ def test_a_scheduler_is_asked_again_each_second_until_a_worker_is_warm(
         slept.append(seconds)
         missing.append(made.missing)
 
-    monkeypatch.setattr("service.jobs.dask_executor.asyncio.sleep", sleep)
+    replace_sleep(monkeypatch, sleep)
     asyncio.run(made.start())
     assert slept == [1.0, 1.0]
     assert missing == ["the Dask scheduler tcp://a:1 does not answer"] * 2

@@ -15,6 +15,7 @@ from service.jobs.executor import LimitReached, WorkerDied
 from service.jobs.process_executor import ProcessExecutor
 from service.jobs.worker import StoreConfig
 from service.processes import limits, spawned
+from tests.sleeping import replace_sleep
 
 
 def test_a_worker_that_still_warms_up_holds_no_stop_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,18 +109,13 @@ def test_a_worker_that_does_not_start_is_tried_again_after_a_second(
         if done.count("warm") == 1:
             raise BrokenProcessPool
 
-    sleep = asyncio.sleep
-
     async def pause(seconds: float) -> None:
-        if seconds != process_executor.RETRY_SECONDS:  # other loops of this process sleep by the same function
-            await sleep(seconds)
-        else:
-            done.append(f"slept {seconds:g}")
+        done.append(f"slept {seconds:g}")
 
     monkeypatch.setattr(worker, "warm_up", warm_up)
     monkeypatch.setattr(spawned, "lower_priority", lambda: done.append("nice"))
     monkeypatch.setattr(spawned, "process", lambda: ThreadPoolExecutor(1))
-    monkeypatch.setattr("service.jobs.process_executor.asyncio.sleep", pause)
+    replace_sleep(monkeypatch, pause)
 
     async def start() -> None:
         executor = ProcessExecutor(StoreConfig("sqlite:///x", Path("there")), 2.0)

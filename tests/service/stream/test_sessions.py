@@ -12,6 +12,7 @@ from service.stream import detectors, sessions
 from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.messages import Open
 from service.stream.sessions import RecentAnswers, Session, Streams
+from tests.sleeping import replace_sleep
 
 
 class Here(Streams):
@@ -186,7 +187,7 @@ def test_a_frame_that_came_too_fast_is_tried_again_after_longer_and_longer(monke
     async def steps() -> None:
         streams = Here(answer=step)
         session = await streams.begin()
-        monkeypatch.setattr("service.stream.sessions.asyncio.sleep", sleep)
+        replace_sleep(monkeypatch, sleep)
         frame: Any = None
         assert await streams.detect(session, frame, False) == ({"number": 1}, None)
 
