@@ -20,6 +20,7 @@ WHOLE_TABLES = {
     "slipcore.contact.EDGES": "of stress at cells' centres, which no log has; docs/accuracy-contact.md has its errors",
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
+    "slipcore.forces.OVER_TIME": "of a way that is taken on request; docs/accuracy-forces.md has what it changes",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",
     "slipcore.RECONSTRUCTED_FORCES": "of reconstructed forces, which the page's logs do not have",
     "slipcore.CONTRADICTION": "needs logs with faulty forces; tests/slipcore/detection has them",

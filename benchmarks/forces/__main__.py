@@ -5,11 +5,11 @@ Presses whose forces are known (benchmarks/forces/scenes.py) are seen by simulat
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of 5
 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, the criterion that chooses
 the prior's strength, and the gel's description, which is then wrong. It is also learnt from presses
-(benchmarks/forces/presses.py), frames are followed as they come (benchmarks/forces/stream.py), displacement is cut at
-the end of a range (benchmarks/forces/saturation.py), an independent solver's scenes are read
-(benchmarks/forces/references.py), grasps are taken to friction and slip with the gripper's force alone
-(benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py), and maps of height are read
-(benchmarks/forces/height_maps.py); and gels that are not alike thick everywhere are pressed on
+(benchmarks/forces/presses.py), frames are followed as they come (benchmarks/forces/stream.py) and found by all of a log
+(benchmarks/forces/over_time.py), displacement is cut at the end of a range (benchmarks/forces/saturation.py), an
+independent solver's scenes are read (benchmarks/forces/references.py), grasps are taken to friction and slip with the
+gripper's force alone (benchmarks/forces/friction.py), slip is found on other sensors (benchmarks/forces/slip.py), and
+maps of height are read (benchmarks/forces/height_maps.py); and gels that are not alike thick everywhere are pressed on
 (benchmarks/forces/uneven.py). In the plane the normal force on a half-space is given.
 Peers are given the same displacements. Errors are those of resultants, of the field of forces on elements, and their
 growth with noise; how often stated intervals of 95 % hold the truth is reported for each group.
@@ -38,6 +38,7 @@ from scipy.ndimage import uniform_filter
 
 from benchmarks.forces import friction as gel_friction
 from benchmarks.forces import height_maps as gel_height_maps
+from benchmarks.forces import over_time as gel_over_time
 from benchmarks.forces import presses as gel_presses
 from benchmarks.forces import references as gel_references
 from benchmarks.forces import saturation as gel_saturation
@@ -72,6 +73,7 @@ GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "criterion", "w
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
 SLIP_GROUP, HEIGHT_GROUP, UNEVEN_GROUP = "slip by sensor", "height maps", "uneven gel"
+OVER_TIME_GROUP = "over time"
 COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
@@ -365,6 +367,14 @@ def follow(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {STREAM_GROUP: text}, arguments, "forces-stream.json")
 
 
+def smooth(arguments: argparse.Namespace) -> None:
+    """Each frame by all of them."""
+    found = list(gel_over_time.scores())
+    text = gel_over_time.over_time_table(found)
+    print(f"{OVER_TIME_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {OVER_TIME_GROUP: text}, arguments, "forces-over-time.json")
+
+
 def saturate(arguments: argparse.Namespace) -> None:
     """Displacement at the end of a sensor's range."""
     found = gel_saturation.detections()
@@ -440,6 +450,7 @@ def main() -> None:
     alone = {
         CALIBRATION_GROUP: calibrate,
         STREAM_GROUP: follow,
+        OVER_TIME_GROUP: smooth,
         SATURATION_GROUP: saturate,
         COVERAGE_GROUP: cover,
         REFERENCES_GROUP: refer,

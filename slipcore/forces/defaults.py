@@ -134,6 +134,22 @@ class FitDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OverTimeDefaults(Options):
+    """Tractions by all frames of a contact (``over_time.py``)."""
+
+    shortest: Annotated[float, Option(1e-3, 10.0, "frames", "e⁻¹⁰ of a frame is kept in the next")] = 0.1
+    """Time over which tractions last, at least."""
+    longest: Annotated[float, Option(1.0, 1e15, "frames", "a load at rest changes by a 10⁻⁷ of itself")] = 1e14
+    """The same, at most."""
+    grid: Annotated[int, Option(3, 1000, "times", "a decade apart")] = 16
+    """Tried at equal ratios before the best is refined."""
+    settled: Annotated[float, Option(1e-6, 1.0, "-", "a tenth of the time: errors change by 3 % of themselves")] = 0.1
+    """Of its logarithm, to which it is found."""
+    frames: Annotated[int, Option(2, 1_000_000, "frames", "they take some 20 kB each")] = 1000
+    """At once, at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LatticeDefaults(Options):
     """Traction anywhere under the lattice (``whole_lattice.py``)."""
 
@@ -291,10 +307,23 @@ PRIOR = PriorDefaults()
 STRENGTH = StrengthDefaults()
 SUPPORT = SupportDefaults()
 FIT = FitDefaults()
+OVER_TIME = OverTimeDefaults()
 LATTICE = LatticeDefaults()
 RECONSTRUCTION = ReconstructionDefaults()
 FORCE_STREAM = ForceStreamDefaults()
 GEL_CALIBRATION = GelCalibrationDefaults()
 
-TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION, FORCE_STREAM, GEL_CALIBRATION)
+TABLES = (
+    NODES,
+    RESPONSE,
+    PRIOR,
+    STRENGTH,
+    SUPPORT,
+    FIT,
+    OVER_TIME,
+    LATTICE,
+    RECONSTRUCTION,
+    FORCE_STREAM,
+    GEL_CALIBRATION,
+)
 """All tables of forces from displacement."""

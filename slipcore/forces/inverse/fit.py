@@ -69,13 +69,14 @@ class TractionFit:
         """Mean tractions [3, j] given data [m], whether or not they pull."""
         return np.asarray((self.operator @ data).reshape(3, -1))
 
-    def traction(self, data: FloatArray) -> FloatArray:
-        """The most probable tractions [3, j] that pull no more than ``FIT.tension`` allows, given data [m].
+    def traction(self, mean: FloatArray) -> FloatArray:
+        """The most probable tractions [3, j] that pull no more than ``FIT.tension`` allows, given their ``mean`` [3, j]
+        whether or not they pull.
 
         A quadratic programme, solved by active sets: pressures below the bound are conditioned on lying at it, and
         freed again where they would push.
         """
-        mean = self.mean(data).ravel()
+        mean = mean.ravel()
         first = len(mean) * 2 // 3
         pressure = self.root[first:]
         excess = mean[first:] + FIT.tension * max(float(mean[first:].max()), 0.0)
@@ -131,7 +132,7 @@ def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: 
     q, r = observation.on(support)
     root = prior.strength * factors(nodes.places()[support], nodes.grid.pitch[0], prior.smoothness)
     j = root.shape[1]
-    stacked = np.concatenate((_times(r, root), np.eye(3 * j)))
+    stacked = np.concatenate((times(r, root), np.eye(3 * j)))
     inner, outer = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
     whitened = solve_root(np.asarray(outer, dtype=np.float64), np.column_stack((np.eye(3 * j), inner[: len(r)].T)))
     whitened = np.concatenate([part @ rows for part, rows in zip(root, np.split(whitened, 3), strict=True)])
@@ -159,7 +160,7 @@ def log_evidence(
     that the strength of a wide contact would speak against all smaller ones.
     """
     response, reached = condensed(*observation.whitened(support, data))
-    spectrum = Spectrum.of(_times(response, factors(nodes.places()[support], nodes.grid.pitch[0], shape)), reached)
+    spectrum = Spectrum.of(times(response, factors(nodes.places()[support], nodes.grid.pitch[0], shape)), reached)
     strength = spectrum.choose(0.0, len(reached), "evidence")
     return spectrum.log_evidence(strength) + 0.5 * float(spectrum.y @ spectrum.y), TractionPrior(shape, strength)
 
@@ -184,7 +185,7 @@ def choose_prior(
     places, pitch = nodes.places()[support], nodes.grid.pitch[0]
 
     def evaluate(shape: Smoothness, by: Criterion) -> tuple[float, float]:
-        spectrum = Spectrum.of(_times(r, factors(places, pitch, shape)), y)
+        spectrum = Spectrum.of(times(r, factors(places, pitch, shape)), y)
         strength = spectrum.choose(rest, count, by)
         return spectrum.log_evidence(strength), strength
 
@@ -200,7 +201,7 @@ def choose_prior(
     return TractionPrior(best, evaluate(best, criterion)[1])
 
 
-def _times(r: FloatArray, root: FloatArray) -> FloatArray:
+def times(r: FloatArray, root: FloatArray) -> FloatArray:
     """R [r, 3, j] times a block-diagonal factor [3, j, j], as [r, 3 j]."""
     return np.concatenate([r[:, axis] @ root[axis] for axis in range(3)], axis=1)
 

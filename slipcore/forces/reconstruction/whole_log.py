@@ -17,6 +17,7 @@ from slipcore.forces.reconstruction.height import at_points
 from slipcore.forces.recording import DisplacementData, error, rows
 from slipcore.forces.tracking.frame_forces import FrameForces, Reader, typical_deviation
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
+from slipcore.forces.tracking.over_time import ContactRun, runs
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
 from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, FloatArray, GraspLog
@@ -112,14 +113,17 @@ def reconstruct(
     noise: float | None = None,
     criterion: Criterion = "evidence",
     total_force_deviation: float | None = None,
+    over_time: bool = False,
 ) -> Reconstruction:
     """Find the forces that moved a log's markers, by Bayesian inversion of the gel's elastic response.
 
     ``total_force``: what a gripper or a wrist measured, [t] N of normal force (positive where it presses) or [t, 3] N
     of the object on the sensor, NaN where unknown, and its standard ``total_force_deviation`` N (None: 1 % of it);
     without it the log's own ``gripper_force`` is taken where it is above 0. ``noise`` m of a marker's coordinate (None:
-    estimated from the log); ``criterion`` that chooses the strength of the prior. Markers whose z never changes count
-    as seen in the plane only, and displacements at the end of the sensor's range as not seen along that axis.
+    estimated from the log); ``criterion`` that chooses the strength of the prior; ``over_time``: whether each frame is
+    found by all before it and after in which markers have hardly moved, by a Kalman filter and smoother. Markers whose
+    z never changes count as seen in the plane only, and displacements at the end of the sensor's range as not seen
+    along that axis.
     Of a log that saw displacement along the normal alone, forces along the surface are 0 with an infinite deviation; it
     is taken for the height of places, as maps show it, not of points of the gel.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
@@ -132,11 +136,11 @@ def reconstruct(
         total_force_deviation = log.gripper_force_deviation
     known = KnownForce.of(total_force, total_force_deviation, len(log))
     known.check(name, gel, log.element_area * math.prod(log.grid))
-    result, lattice = _followed(log, sensor, shown, known, criterion)
+    result, lattice = _followed(log, sensor, shown, known, criterion, over_time)
     if sensor.sees_along_surface:
         return result
     of_points, _ = rows(at_points(log, gel, result.force), shown.saturated, shown.axes)
-    result, _ = _followed(log, sensor, replace(shown, data=of_points), known, criterion, lattice)
+    result, _ = _followed(log, sensor, replace(shown, data=of_points), known, criterion, over_time, lattice)
     return _normal_alone(result)
 
 
@@ -146,6 +150,7 @@ def _followed(
     shown: DisplacementData,
     known: KnownForce,
     criterion: Criterion,
+    over_time: bool,
     lattice: WholeLattice | None = None,
 ) -> tuple[Reconstruction, WholeLattice | None]:
     """Forces in all frames, from that in which markers moved most both ways, and the ``lattice`` by which pressed nodes
@@ -169,14 +174,16 @@ def _followed(
         condition=observation.condition(fit.support),
         kernel_width=fit.kernel_width(observation, sensor.nodes.grid.pitch[0]),
     )
-    for way in (range(strongest, len(log)), range(strongest - 1, -1, -1)):
-        now, reader = tracker, Reader.of(sensor, tracker.key)
-        for t in way:
-            if touched[t]:
-                observation, data = recording.frame(t)
-                now = now.at(observation, data)
-                reader = reader if reader.key is now.key else Reader.of(sensor, now.key)
-                _write_frame(result, t, reader.read(data, log.grid))
+    for key, frames in runs(tracker, recording.frame, touched, strongest):
+        data = np.stack([recording.frame(t)[1] for t in frames])
+        run = (
+            ContactRun.of(key, data, log.time[frames], shown.noise)
+            if over_time
+            else ContactRun.frame_by_frame(key, len(data))
+        )
+        reader = Reader.of(sensor, run.key)
+        for t, each, estimate in zip(frames, data, run.estimates, strict=True):
+            _write_frame(result, t, reader.read(each, log.grid, estimate))
     away = known.away(result.resultant, result.resultant_deviation)
     return replace(result, contradiction=np.where(touched[:, None], away, np.nan)), tracker.lattice
 

@@ -58,6 +58,14 @@ class FrameForces:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FrameEstimate:
+    """What is known of a frame by others as well: ``mean`` tractions [3, j], and ``data`` [m] m with less noise."""
+
+    mean: FloatArray
+    data: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
@@ -104,13 +112,14 @@ class Reader:
         """Whether the normal resultant was known from elsewhere."""
         return bool(np.isfinite(self.key.observation.noise[-1]))
 
-    def read(self, data: FloatArray, grid: tuple[int, int]) -> FrameForces:
+    def read(self, data: FloatArray, grid: tuple[int, int], estimate: FrameEstimate | None = None) -> FrameForces:
         """Forces of a frame's ``data`` [m] m on elements of this grid; what the fit leaves unexplained beyond noise
-        widens their deviations.
+        widens their deviations. ``estimate``: that by other frames, too.
         """
-        traction = self.key.fit.traction(data)
+        known = FrameEstimate(self.key.fit.mean(data), data) if estimate is None else estimate
+        traction = self.key.fit.traction(known.mean)
         misfit = self._misfit(traction, data)
-        of_elements, of_wrench = self._deviations(traction, data, misfit)
+        of_elements, of_wrench = self._deviations(traction, known, misfit)
         wrench = self._wrench(traction)
         force = ((self.elements @ traction.T) * OUTWARD).reshape(*grid, 3)
         largest = RECONSTRUCTION.element_error * np.abs(force).max()
@@ -127,19 +136,19 @@ class Reader:
             _touching(-force[..., 2], by_noise) & covered,
         )
 
-    def _deviations(self, traction: FloatArray, data: FloatArray, misfit: float) -> tuple[FloatArray, FloatArray]:
+    def _deviations(self, traction: FloatArray, known: FrameEstimate, misfit: float) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of elements' forces [3, e] N and of the wrench [4], N and N m: by the data, by what
         bilinear tractions leave wrong, by how much the bound on pulling changes what the data say, and by what other
         contacts are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382).
         """
-        linear = self.key.fit.mean(data)
+        linear = known.mean
         bound = traction - linear
         unresolved, of_wrench = self.unresolved.deviations(traction)
         of_elements = (misfit * self.deviation) ** 2 + (bound @ self.elements.T) ** 2
         of_elements[:, self.unresolved.near] += unresolved**2
         total = (misfit * self.total) ** 2 + of_wrench**2 + self._wrench(bound) ** 2
         for probability, fit in self.key.others:
-            other = fit.mean(data)
+            other = fit.mean(known.data)
             differs = other @ self.sensor.elements[:, fit.support].T - linear @ self.elements.T
             of_elements += probability * differs**2
             total += probability * (_wrench(self.sensor.wrench()[..., fit.support], other) - self._wrench(linear)) ** 2

@@ -432,3 +432,38 @@ def test_samples_go_by_forces_averaged_alike(pressed: Pressed) -> None:
     np.testing.assert_array_equal(truth(sampled), found.alike)
     assert sampled.has_reconstructed_force
     assert 0.0 < relative(found.alike, found.force) < 0.1
+
+
+def test_by_all_frames_of_a_load_at_rest_noise_counts_less(pressed: Pressed) -> None:
+    """With 10 µm, against what is found without noise: of sixteen frames a quarter, and what the contact leaves."""
+    log = replace(pressed([6] * 16, noise=10e-6, crop=slice(4, 16)), force=None)
+    without = reconstruct(pressed([6] * 2, crop=slice(4, 16)), GEL, noise=1e-7).resultant[0]
+    alone, by_all = (reconstruct(log, GEL, noise=10e-6, over_time=over_time) for over_time in (False, True))
+    single, together = (np.abs(found.resultant - without).mean(axis=0) for found in (alone, by_all))
+    assert (together < 0.6 * single).all()
+    assert (by_all.resultant_deviation < alone.resultant_deviation).all()
+    assert (np.abs(by_all.resultant - without) < 3.0 * by_all.resultant_deviation).all()
+    np.testing.assert_array_equal(by_all.contact.shape, alone.contact.shape)
+
+
+def test_a_step_of_the_load_stays_one_by_all_frames(pressed: Pressed) -> None:
+    """By 2 %, too little to seek the contact again: less than a tenth of it is found a frame early or late."""
+    log = pressed([6] * 16, crop=slice(4, 16))
+    step = np.where(np.arange(16) < 8, 1.0, 0.98)[:, None, None, None]
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(log.displacement.shape)
+    shown = replace(log, displacement=step * log.displacement + noise, force=None)
+    found = -reconstruct(shown, GEL, noise=1e-6, over_time=True).resultant[:, 2]
+    height = found[:8].mean() - found[8:].mean()
+    assert height == pytest.approx(0.02 * found[0], rel=0.1)
+    assert np.abs(found[[6, 7]] - found[:6].mean()).max() < 0.1 * height
+    assert np.abs(found[[8, 9]] - found[10:].mean()).max() < 0.1 * height
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_by_all_frames_forces_scale_with_the_unit_of_force(pressed: Pressed, factor: float) -> None:
+    log = replace(pressed([6] * 4, noise=3e-6, crop=slice(6, 14)), force=None)
+    first = replace(GEL, young_modulus=1e8 if factor < 1.0 else 1e6)
+    gels = (first, replace(first, young_modulus=factor * first.young_modulus))
+    found, scaled = (reconstruct(log, gel, noise=3e-6, over_time=True) for gel in gels)
+    largest = np.abs(found.force).max()
+    np.testing.assert_allclose(scaled.force / factor, found.force, rtol=0.0, atol=1e-9 * largest)
