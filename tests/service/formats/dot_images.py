@@ -16,9 +16,9 @@ def lattice(rows: int = 20, columns: int = 20) -> FloatArray:
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
-def jittered(seed: int = 1) -> FloatArray:
+def jittered(seed: int = 1, rows: int = 20, columns: int = 20) -> FloatArray:
     """A lattice whose dots are up to a fifth of the pitch off."""
-    return lattice() + np.random.default_rng(seed).uniform(-0.2 * PITCH, 0.2 * PITCH, (400, 2))
+    return lattice(rows, columns) + np.random.default_rng(seed).uniform(-0.2 * PITCH, 0.2 * PITCH, (rows * columns, 2))
 
 
 def draw(
