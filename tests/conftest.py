@@ -78,10 +78,12 @@ def template(postgresql: PostgreSQL) -> str:
 def migrations() -> Iterator[Remembered]:
     """What the migrations make of an empty file, and how it compares with the tables of the code, once a process.
 
-    They run where a test asks for ``real_migrations``, and in other processes.
+    They run where a test asks for ``real_migrations``, and in other processes. Their files are read once as well, and
+    not for each way up and down.
     """
     with pytest.MonkeyPatch.context() as patched:
         remembered = Remembered()
+        patched.setattr("db.migrate.command.ScriptDirectory", SimpleNamespace(from_config=lambda _: migrate._scripts()))
         patched.setattr("db.migrate.command.upgrade", remembered.upgrade)
         patched.setattr("db.migrate.compare_metadata", remembered.compare)
         yield remembered

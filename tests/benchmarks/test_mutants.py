@@ -108,7 +108,11 @@ def test_scaled():
 @pytest.fixture
 def copy(tmp_path: Path) -> ScratchCopy:
     """Of a small repository, as covered: ``test_total`` runs a loop, the others ``is_large``."""
-    checkout = tmp_path / "checkout"
+    return copied(tmp_path)
+
+
+def copied(folder: Path) -> ScratchCopy:
+    checkout = folder / "checkout"
     for name, text in {
         "slipcore/__init__.py": "",
         "slipcore/program.py": PROGRAM,
@@ -123,7 +127,7 @@ def copy(tmp_path: Path) -> ScratchCopy:
         (checkout / package).mkdir()
         (checkout / package / "__init__.py").touch()
     subprocess.run(["git", "init", "--quiet"], cwd=checkout, check=True)
-    copy = ScratchCopy(tmp_path / "work", checkout)
+    copy = ScratchCopy(folder / "work", checkout)
     copy.root.mkdir(parents=True)
     copy.refresh()
     copy.keep()
@@ -149,7 +153,7 @@ def _cover(data: Path, lines: dict[str, list[int]]) -> None:
 
 @pytest.fixture
 def court(copy: ScratchCopy) -> Iterator[Court]:
-    with closing(Court(copy, ["slipcore/program.py"], libraries="", least=2.0)) as court:
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", least=0.5)) as court:
         yield court
 
 
@@ -296,14 +300,16 @@ def test_files_about_a_module_are_found_nearest_first(tmp_path: Path, module: st
     assert nearby.files(module) == [f"tests/slipcore/{file}" for file in files]
 
 
-@pytest.fixture
-def court_in_place(copy: ScratchCopy) -> Iterator[Court]:
+@pytest.fixture(scope="module")
+def in_place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ScratchCopy, Court]]:
+    """A copy with kernels and its court, for all changes: each is tried in a process of its own, and none stays."""
+    copy = copied(tmp_path_factory.mktemp("in place"))
     (copy.root / "slipcore/kernels.py").write_text(KERNELS)
     (copy.root / "tests/slipcore/test_kernels.py").write_text(KERNEL_TESTS)
     copy.data.unlink()
     paths = ["slipcore/kernels.py", "slipcore/program.py"]
     with closing(Court(copy, paths, libraries="", least=2.0, in_place=True)) as court:
-        yield court
+        yield copy, court
 
 
 @pytest.mark.parametrize(
@@ -322,11 +328,12 @@ def court_in_place(copy: ScratchCopy) -> Iterator[Court]:
     ],
 )
 def test_a_change_made_in_place_is_noticed_as_one_that_is_imported(
-    copy: ScratchCopy, court_in_place: Court, path: str, old: str, new: str, test: str
+    in_place: tuple[ScratchCopy, Court], path: str, old: str, new: str, test: str
 ) -> None:
+    copy, court = in_place
     edit = next(e for e in edits(copy.root, f"slipcore/{path}.py") if (e.old, e.new) == (old, new))
-    assert court_in_place.try_mutant(edit).by == (test and f"tests/slipcore/{test}")
-    assert not court_in_place.try_mutant(edit.undone()).is_killed
+    assert court.try_mutant(edit).by == (test and f"tests/slipcore/{test}")
+    assert not court.try_mutant(edit.undone()).is_killed
 
 
 def test_in_place_all_tests_are_tried_until_their_time_is_used(copy: ScratchCopy) -> None:
