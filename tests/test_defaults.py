@@ -220,3 +220,17 @@ def test_each_number_of_a_reader_that_changes_its_log_has_its_unit_and_reason(fi
 )
 def test_a_bare_number_is_found(text: str) -> None:
     assert bare_constants(text) or bare_numbers(text)
+
+
+def test_every_default_is_read() -> None:
+    code = [path for package in (*PACKAGES, "service") for path in (ROOT / package).rglob("*.py")]
+    read = {
+        word
+        for path in code
+        for word in re.findall(
+            r"self\.(\w+)" if path.name == "defaults.py" else r"(\w+)", path.read_text(encoding="utf-8")
+        )
+    }
+    assert {
+        f"{kind.__name__}.{entry.name}" for kind in KINDS for entry in fields(kind) if entry.name not in read
+    } == set()

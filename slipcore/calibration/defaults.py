@@ -81,8 +81,6 @@ class EstimateDefaults(Options):
     """The same, as a share of the frames."""
     noise_blocks: Annotated[int, Option(4, 1000, "blocks", "a standard error to 18 %")] = 16
     """Groups of elements that are left out in turn: their scatter shows how sure the noise is."""
-    noise_memories: Annotated[int, Option(10, 10_000, "values", "steps of 5 %, refined")] = 19
-    """Correlations from frame to frame that are tried between 0 and 1."""
 
     wide_kernel: Annotated[float, Option(0.0, 100.0, "elements", "turns a pivot's friction by 2 %")] = 0.5
     """Least width of a kernel that a detection is given."""
