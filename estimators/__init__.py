@@ -9,12 +9,12 @@ from estimators.warm_up import warm_up
 
 if TYPE_CHECKING:
     from estimators.change_alarm import ChangeAlarm
+    from estimators.change_detector import ChangeDetector
     from estimators.fitting import fit, needs_samples
     from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales, SensorFriction, SensorScale
     from estimators.grasp_design import NextGrasp, Probing, WorkingPoint, next_grasp
     from estimators.moments import Moments
     from estimators.not_converged import NotConverged
-    from estimators.online import ChangeDetector
     from estimators.population import ScatterPrior, population_scatter
     from estimators.recognition import recognise
     from estimators.single_grasps import GraspEffect, grasp_effects
@@ -38,7 +38,7 @@ _LAZY = {
     "WorkingPoint": "estimators.grasp_design",
     "next_grasp": "estimators.grasp_design",
     "NotConverged": "estimators.not_converged",
-    "ChangeDetector": "estimators.online",
+    "ChangeDetector": "estimators.change_detector",
     "ScatterPrior": "estimators.population",
     "population_scatter": "estimators.population",
     "recognise": "estimators.recognition",

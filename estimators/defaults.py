@@ -434,7 +434,7 @@ class Automatic(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChangeSettings(Options):
-    """The sequential test for a changed surface (``online.py``)."""
+    """The sequential test for a changed surface (``change_detector.py``)."""
 
     alarm: Annotated[float, Option(1e-12, 0.5, "-", "one false alarm in a thousand stretches")] = 1e-3
     spread: Annotated[float, Option(1e-3, 100.0, "standard deviations", "a shift of half a deviation matters")] = 0.5

@@ -152,7 +152,7 @@ CLIENT_OTHER = {
     "controller/settings.py": "the gains, each with its range, unit and reason",
     "defaults.py": "the table",
     "model.py": "the file format's name and version",
-    "recorded.py": "rounding that a model may have when it is read, which changes no answer",
+    "json_values.py": "rounding that a model may have when it is read, which changes no answer",
     "planner.py": "permitted ranges, and the default bound, an argument of the call",
 }
 """Modules of the client that have numbers of their own, with what these are."""

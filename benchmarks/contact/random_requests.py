@@ -22,7 +22,7 @@ from slipcore.contact.errors import InfeasibleLoad, NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress
 from slipcore.contact.scene import Scene
-from slipcore.contact.solver.kernels import load_kernels
+from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers import requests as runs
 from slipcore.contact.tiers.accuracy import Refined, difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run

@@ -14,7 +14,7 @@ from benchmarks.estimators.scatter import KINDS, WORKING_POINT, grasp
 from benchmarks.estimators.several_sensors import material as of_sensors
 from benchmarks.sensitivity.measures import summary
 from benchmarks.sensitivity.rows import Known, Row, of_tables
-from estimators import change_alarm, grasp_design, influence, online, population, recognition
+from estimators import change_alarm, change_detector, grasp_design, influence, population, recognition
 from estimators import defaults as of_estimators
 from slipcore.samples import FrictionSamples
 
@@ -94,7 +94,7 @@ def watched() -> dict[str, float]:
     for seed in range(SERIES):
         rng = np.random.default_rng([seed, 31])
         late += [_noticed(_plain(offset, 400, rng)) for offset in (-0.02, 0.06)]
-        detector, most = online.ChangeDetector(plain()), 0.0
+        detector, most = change_detector.ChangeDetector(plain()), 0.0
         for row in _rows(_plain(0.0, 400, rng)):
             detector = detector.step(*row)
             most = max(most, detector.e_value)
@@ -108,7 +108,7 @@ def _rows(seen: FrictionSamples) -> list[tuple[float, float, float]]:
 
 
 def _noticed(seen: FrictionSamples) -> int:
-    detector = online.ChangeDetector(plain())
+    detector = change_detector.ChangeDetector(plain())
     for count, row in enumerate(_rows(seen)):
         detector = detector.step(*row)
         if detector.changed:

@@ -16,7 +16,7 @@ import slipcore.calibration.defaults
 import slipcore.contact.defaults
 import slipcore.defaults
 import slipcore.forces.defaults
-from estimators import change_alarm, grasp_design, online, population, recognition
+from estimators import change_alarm, change_detector, grasp_design, population, recognition
 from slipcore import METHODS, CheckOptions, PatchOptions, SampleOptions
 from slipcore.contact.elasticity import bonded_layer
 from slipcore.contact.scene import explain
@@ -37,7 +37,7 @@ MODULES = (
     slipcore.forces.defaults,
     estimators.defaults,
 )
-READ_ONCE = (recognition, change_alarm, online, population, grasp_design, explain, beam_lattice)
+READ_ONCE = (recognition, change_alarm, change_detector, population, grasp_design, explain, beam_lattice)
 """Modules that read a table as they are imported."""
 Key = tuple[str, str]
 """A table's qualified name, and that of one of its entries."""

@@ -19,7 +19,7 @@ from uuid import uuid4
 import httpx
 import numpy as np
 
-from stiction_client import container, problems, recorded
+from stiction_client import container, json_values, problems
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
     AnswerTooLarge,
@@ -224,7 +224,7 @@ def _listed(
 
 def _next(record: Mapping[str, Any]) -> str | None:
     cursor = record.get("next")
-    return None if cursor is None else recorded.text("next", cursor)
+    return None if cursor is None else json_values.text("next", cursor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,7 +307,7 @@ def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
 
 def _withdrawn(record: Mapping[str, Any]) -> GraspLogReceipt:
     log, other = GraspLogReceipt.from_json(record["grasp_log"]), record.get("counts_instead")
-    return replace(log, counts_instead=None if other is None else recorded.text("counts_instead", other))
+    return replace(log, counts_instead=None if other is None else json_values.text("counts_instead", other))
 
 
 Names = set[tuple[str, str]]

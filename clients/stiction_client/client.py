@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import httpx
 
-from stiction_client import calls, heads
+from stiction_client import calls, head_timeout
 from stiction_client.arguments import within
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
@@ -606,7 +606,7 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
     }
     headers = {name: value for name, value in given.items() if value is not None}
     answered_within = (http.timeout.read or 0.0) + request.wait_seconds
-    bounded = heads.bounded_async if isinstance(http, httpx.AsyncClient) else heads.bounded
+    bounded = head_timeout.bounded_async if isinstance(http, httpx.AsyncClient) else head_timeout.bounded
     with _address_checked(request.path):
         return http.build_request(
             request.method,

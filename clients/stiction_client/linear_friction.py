@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from stiction_client import recorded
+from stiction_client import json_values
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import UNKNOWN_SENSOR, Domain, Kind, Support, extrapolation, notes, support, widening
@@ -32,8 +32,8 @@ class Scale:
     def from_json(cls, record: Mapping[str, Any]) -> "Scale":
         """The scale in the service's answer."""
         return cls(
-            recorded.number("value", record["value"], least=0.0),
-            recorded.degrees_of_freedom(record["degrees_of_freedom"]),
+            json_values.number("value", record["value"], least=0.0),
+            json_values.degrees_of_freedom(record["degrees_of_freedom"]),
         )
 
     def to_json(self) -> dict[str, float | None]:
@@ -66,15 +66,16 @@ class SensorFriction:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "SensorFriction":
         """The sensor in the service's answer."""
+        area = record.get("element_area")
         return cls(
-            recorded.number("gain", record["gain"]),
-            recorded.number("standard_error", record["standard_error"], least=0.0),
-            tuple(recorded.coefficients(record["coefficients"]).tolist()),
-            tuple(tuple(row) for row in recorded.covariance(record["covariance"]).tolist()),
-            recorded.degrees_of_freedom(record["degrees_of_freedom"]),
-            recorded.number("scale", record["scale"], least=0.0),
-            recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
-            None if (area := record.get("element_area")) is None else recorded.number("element_area", area, above=0.0),
+            json_values.number("gain", record["gain"]),
+            json_values.number("standard_error", record["standard_error"], least=0.0),
+            tuple(json_values.coefficients(record["coefficients"]).tolist()),
+            tuple(tuple(row) for row in json_values.covariance(record["covariance"]).tolist()),
+            json_values.degrees_of_freedom(record["degrees_of_freedom"]),
+            json_values.number("scale", record["scale"], least=0.0),
+            json_values.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
+            None if area is None else json_values.number("element_area", area, above=0.0),
         )
 
     def enlarged(self, part: float) -> "SensorFriction":
@@ -388,7 +389,7 @@ class LinearFriction:
 
 
 def degrees_to_json(value: float) -> float | None:
-    """What ``recorded.degrees_of_freedom`` reads."""
+    """What ``json_values.degrees_of_freedom`` reads."""
     return value if math.isfinite(value) else None
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_client import recorded
+from stiction_client import json_values
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
@@ -68,25 +68,26 @@ class FrictionModel(LinearFriction):
         Raises ``ValueError`` for what no fit gives: text or ``true`` for a number, a negative variance.
         """
         domain, cost = record["domain"], record["cost"]
+        identifiable = [json_values.truth("identifiable", each) for each in record["identifiable"]]
         return cls(
-            material=recorded.text("material", record["material"]),
-            method=recorded.text("method", record["method"]),
-            version=recorded.whole("version", record["version"], least=1),
-            coefficients=recorded.coefficients(record["coefficients"]),
-            covariance=recorded.covariance(record["covariance"]),
-            scale=recorded.number("scale", record["scale"], least=0.0),
-            n=recorded.whole("n", record["n"], least=1),
-            degrees_of_freedom=recorded.degrees_of_freedom(record["degrees_of_freedom"]),
-            scatter_degrees_of_freedom=recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
-            domain=Domain(*(recorded.span(name, domain[name]) for name in ("tangential_velocity", "normal_force"))),
-            identifiable=np.array([recorded.truth("identifiable", each) for each in record["identifiable"]]).reshape(3),
-            element_area=recorded.number("element_area", record["element_area"], above=0.0),
-            cost=Cost(*(recorded.number(name, cost[name], least=0.0) for name in ("seconds", "monte_carlo_error"))),
-            current=recorded.truth("current", record["current"]),
+            material=json_values.text("material", record["material"]),
+            method=json_values.text("method", record["method"]),
+            version=json_values.whole("version", record["version"], least=1),
+            coefficients=json_values.coefficients(record["coefficients"]),
+            covariance=json_values.covariance(record["covariance"]),
+            scale=json_values.number("scale", record["scale"], least=0.0),
+            n=json_values.whole("n", record["n"], least=1),
+            degrees_of_freedom=json_values.degrees_of_freedom(record["degrees_of_freedom"]),
+            scatter_degrees_of_freedom=json_values.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
+            domain=Domain(*(json_values.span(name, domain[name]) for name in ("tangential_velocity", "normal_force"))),
+            identifiable=np.array(identifiable).reshape(3),
+            element_area=json_values.number("element_area", record["element_area"], above=0.0),
+            cost=Cost(*(json_values.number(name, cost[name], least=0.0) for name in ("seconds", "monte_carlo_error"))),
+            current=json_values.truth("current", record["current"]),
             diagnostics=dict(record["diagnostics"]),
-            created_at=recorded.text("created_at", record["created_at"]),
+            created_at=json_values.text("created_at", record["created_at"]),
             scales=None if record.get("scales") is None else Scales.from_json(record["scales"]),
-            outdated=recorded.truth("outdated", record.get("outdated", False)),
+            outdated=json_values.truth("outdated", record.get("outdated", False)),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -127,7 +128,7 @@ class FrictionModel(LinearFriction):
     def load(cls, path: Path | str) -> "FrictionModel":
         """The model in a file that ``save`` wrote; raises ``InvalidArgument`` for any other."""
         try:
-            record = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=recorded.members)
+            record = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=json_values.members)
             kind, version = record["format"], record["version"]
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise InvalidArgument("file", path, f"one that FrictionModel.save wrote ({error})") from error

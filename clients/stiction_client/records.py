@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
-from stiction_client import recorded
+from stiction_client import json_values
 from stiction_client.errors import JobCancelled, JobFailed, JobRefused
 from stiction_client.model import FrictionModel
 
@@ -32,7 +32,7 @@ class Material:
         models = {method: FrictionModel.from_json(model) for method, model in record["models"].items()}
         best = record.get("recommended", {"method": "ols"})  # an older service recommends none
         return cls(
-            name=recorded.text("name", record["name"]),
+            name=json_values.text("name", record["name"]),
             description=record["description"],
             created_at=record["created_at"],
             grasp_logs=int(record["grasp_logs"]),
@@ -66,7 +66,7 @@ class Job:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Job":
         """The job in the service's answer."""
-        return cls(**_values(cls, record) | {"status": recorded.text("status", record["status"])})
+        return cls(**_values(cls, record) | {"status": json_values.text("status", record["status"])})
 
     @property
     def ended(self) -> bool:
@@ -232,9 +232,9 @@ class FrictionAnswer:
         """The lookup in the service's answer; raises ``ValueError`` for numbers that no friction has."""
         told = _values(cls, record) | {"notes": tuple(record.get("notes", ()))}
         for name in ("friction_coefficient", "tangential_velocity", "normal_force"):
-            told[name] = recorded.number(name, told[name], least=0.0)
-        told["mean"] = recorded.number("mean", told["mean"])
-        told["within_domain"] = recorded.truth("within_domain", told["within_domain"])
+            told[name] = json_values.number(name, told[name], least=0.0)
+        told["mean"] = json_values.number("mean", told["mean"])
+        told["within_domain"] = json_values.truth("within_domain", told["within_domain"])
         return cls(**told)
 
 
@@ -265,11 +265,11 @@ class NextGrasp:
     def from_json(cls, record: Mapping[str, Any]) -> "NextGrasp":
         """The grasp in the service's answer; raises ``ValueError`` for numbers that no grasp has."""
         told = _values(cls, record)
-        told["normal_force"] = recorded.number("normal_force", told["normal_force"], above=0.0)
+        told["normal_force"] = json_values.number("normal_force", told["normal_force"], above=0.0)
         for name in ("slip_length", "speed", "seconds", "uncertainty", "after"):
-            told[name] = recorded.number(name, told[name], least=0.0)
+            told[name] = json_values.number(name, told[name], least=0.0)
         for name in ("direction", "conservative_friction"):
-            told[name] = recorded.number(name, told[name])
+            told[name] = json_values.number(name, told[name])
         return cls(**told)
 
 
@@ -320,8 +320,8 @@ class AuditEntry:
 
 
 def _probability(value: object) -> float:
-    found = recorded.number("probability", value, least=0.0)
-    if found > 1.0 + recorded.ROUNDING:
+    found = json_values.number("probability", value, least=0.0)
+    if found > 1.0 + json_values.ROUNDING:
         raise ValueError(f"probability, which is {found:g}")
     return found
 

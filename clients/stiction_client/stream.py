@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
-from stiction_client import recorded
+from stiction_client import json_values
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
@@ -261,7 +261,7 @@ def _has_sound_command(answer: Mapping[str, Any]) -> bool:
     if answer.get("command") is None:
         return True
     try:
-        recorded.number("normal_force", answer["command"]["normal_force"], least=0.0)
+        json_values.number("normal_force", answer["command"]["normal_force"], least=0.0)
     except (TypeError, KeyError, ValueError):
         return False
     return True

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from estimators.method_names import METHODS
-from service.cli.looking import GelFile, SensorModelFile, comparison, look
+from service.cli.inspection import GelFile, SensorModelFile, comparison, inspect_log
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import interval, number
@@ -65,7 +65,7 @@ def detect(
 
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
-        seen = look(grasp, method, sensor_model, gel)
+        seen = inspect_log(grasp, method, sensor_model, gel)
     if picture is not None:
         from service.report.pictures import save, slip_over_time
 
@@ -92,7 +92,7 @@ def check(
 
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
-        seen = look(grasp, method, sensor_model, gel)
+        seen = inspect_log(grasp, method, sensor_model, gel)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
@@ -131,7 +131,7 @@ def fit(
 
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
         log = read_log(path, mapping)
-        seen = look(log, detector, sensor_model, gel)
+        seen = inspect_log(log, detector, sensor_model, gel)
         return grasps.see(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
 
     first = dict[str, Path]()
@@ -194,7 +194,7 @@ def export(
     exports.check_output(output, target)
 
     def recorded(path: Path) -> exports.DetectedLog:
-        seen = look(read_log(path, mapping), method, sensor_model, gel)
+        seen = inspect_log(read_log(path, mapping), method, sensor_model, gel)
         return exports.DetectedLog(seen.log, seen.history, path.name)
 
     recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))

@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
+from service.processes.completion import run_to_completion
 from service.processes.fair_queue import UnboundedFairQueue
-from service.processes.to_its_end import to_its_end
 
 SHORT_AT_ONCE, LONG_AT_ONCE = 6, 2
 """Pieces of work that take some ms each, of which an owner has half at most, and of such as take seconds, of which each
@@ -33,7 +33,7 @@ class FairThreads:
         """The result of ``do``, or what it raised; ``is_long``: it may take seconds."""
         async with (self._long if is_long else self._short).turn(owner):
             run = asyncio.get_running_loop().run_in_executor
-            return await to_its_end(run(self._executor, copy_context().run, do, *arguments))
+            return await run_to_completion(run(self._executor, copy_context().run, do, *arguments))
 
     def stop(self) -> None:
         """End the threads once they have done their work."""

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from service.observability import logs
 from service.processes import spawned
-from service.processes.to_its_end import to_its_end
+from service.processes.completion import run_to_completion
 
 LENGTH = struct.Struct("<Q")
 """In front of every message: its bytes."""
@@ -79,7 +79,7 @@ class SideProcess:
         self._send(_Call(number, is_long, do, arguments))
         answer: asyncio.Future[Result] = asyncio.get_running_loop().create_future()
         self._asked[number] = answer
-        return await to_its_end(answer)
+        return await run_to_completion(answer)
 
     async def stop(self) -> None:
         """End the process; what it is doing has some time left."""

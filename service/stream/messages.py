@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from service.stream.keys_once import check_binary, check_text
+from service.stream.repeated_keys import check_binary, check_text
 from slipcore.errors import InvalidInput
 
 Numbers = bytes | list[Any]

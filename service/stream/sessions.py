@@ -14,9 +14,9 @@ import msgspec
 
 from service.domain.networks import network_of
 from service.formats.reading import Description
+from service.processes.completion import run_to_completion
 from service.processes.fair_queue import UnboundedFairQueue
 from service.processes.side_process import ProcessEnded, SideProcess
-from service.processes.to_its_end import to_its_end
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
 from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
@@ -270,7 +270,8 @@ class Streams:
     async def _started(self) -> SideProcess:
         async with self._starting:
             if self._process is None:
-                return await to_its_end(self._start())  # or who goes at once has one process after the other begin
+                # a client that connects and leaves at once would otherwise start one process after the other
+                return await run_to_completion(self._start())
             return self._process
 
     async def _start(self) -> SideProcess:

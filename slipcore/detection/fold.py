@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.compilation import borrowed, compiled
+from slipcore.detection.filter.backward_pass import step_back
 from slipcore.detection.filter.run import filter_frame
-from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import EXPECTED, PROBABILITY
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
@@ -114,7 +114,7 @@ def revise(
     kept, least = len(elements), sensor.settings[LEAST_TRANSITION]
     posterior[:] = elements[last % kept, PROBABILITY]
     for i in range(last - 1, k - 1, -1):
-        look_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, posterior)
+        step_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, posterior)
     decide(posterior, elements[k % kept, EXPECTED], sensor.settings[THRESHOLD], room.decision)
     before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
     frames = frame_at(log, k - 1), frame_at(log, k)

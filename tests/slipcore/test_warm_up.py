@@ -4,14 +4,14 @@ import numpy as np
 
 from slipcore import SlipDetector, collect_samples, detect_slip, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.detection.filter.backward_pass import step_back
 from slipcore.detection.filter.run import run_filter
-from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.step import decide
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.noise import noise_of_series
 from slipcore.patch import local_rates, motion
 
-KERNELS = (run_filter, look_back, decide, apply_decision)
+KERNELS = (run_filter, step_back, decide, apply_decision)
 OF_SAMPLES = (motion._fill_fits, local_rates._fill_means, noise_of_series)
 
 

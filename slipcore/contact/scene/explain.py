@@ -14,7 +14,7 @@ from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Effect, Observed, Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.simulate import observe
-from slipcore.contact.solver.kernels import load_kernels
+from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.accuracy import Difference, difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
 from slipcore.errors import SlipcoreError

@@ -9,7 +9,7 @@ from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
-from slipcore.contact.solver.kernels import load_kernels
+from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
 from slipcore.contact.tiers.difference import Difference as Difference
 from slipcore.contact.tiers.difference import difference as difference

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from slipcore.defaults import NOISE, FilterOptions
+from slipcore.detection.filter.backward_pass import step_back
 from slipcore.detection.filter.run import run_filter
-from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
     COMMON,
     DOUBTED_FRAMES,
@@ -43,7 +43,7 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
     posterior, least = elements[-1][PROBABILITY], settings[LEAST_TRANSITION]
     for before, after in reversed(list(pairwise(elements))):
         known, posterior = posterior, np.empty(posterior.shape)
-        look_back(before, after, known, least, posterior)
+        step_back(before, after, known, least, posterior)
     decision = Decision(np.empty(posterior.shape, bool), np.empty(posterior.shape))
     decide(posterior, elements[0][EXPECTED], settings[THRESHOLD], decision)
     return decision

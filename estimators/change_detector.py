@@ -1,4 +1,4 @@
-"""Friction as it is learnt, and whether the surface has changed: moments that fade, and a sequential test."""
+"""Whether single samples still follow a model: a sequential test. ``change_alarm`` tests whole grasps."""
 
 import warnings
 from dataclasses import dataclass, replace

@@ -10,7 +10,7 @@ from slipcore.contact.effects import LoadPath, SensorSampling
 from slipcore.contact.elasticity import fields, transform
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver import extrapolation, normal, projection, tangent_space
-from slipcore.contact.solver.kernels import load_kernels
+from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 
 MODULES = (fields, transform, extrapolation, normal, projection, tangent_space)

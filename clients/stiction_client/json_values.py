@@ -1,4 +1,4 @@
-"""Numbers as a service or a file gives them: numbers, and such as a fit can have."""
+"""Values parsed from JSON, of an answer or a file, checked for type and range before they are believed."""
 
 import math
 from typing import Any
@@ -68,7 +68,7 @@ def span(name: str, values: Any) -> tuple[float, float]:
     """A range of sizes, whose ends stand in order."""
     low, high = (number(name, each, least=0.0) for each in values)
     if low > high:
-        raise ValueError(f"{name}, from {low:g} to {high:g}")
+        raise ValueError(f"{name}, from {low:g} to {high:g}; allowed: in ascending order")
     return low, high
 
 

@@ -1,4 +1,4 @@
-"""What later frames say of an earlier one."""
+"""The backward pass of the fixed-lag smoother: slip probabilities revised by later frames."""
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import expected
@@ -7,7 +7,7 @@ from slipcore.frames import FloatArray
 
 
 @compiled
-def look_back(
+def step_back(
     before: FloatArray, elements: FloatArray, later: FloatArray, least_transition: float, revised: FloatArray
 ) -> None:
     """Fill ``revised`` [n, m], slip probabilities one frame earlier, from ``later`` ones that know more.

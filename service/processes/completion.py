@@ -1,4 +1,4 @@
-"""Work that has begun elsewhere, in a thread or in another process, and cannot be called back."""
+"""Cancellation of work in a thread or another process, which cannot be stopped once it has begun."""
 
 import asyncio
 from collections.abc import Awaitable
@@ -8,10 +8,10 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 
-async def to_its_end(work: Awaitable[Result]) -> Result:
-    """The result of work, or what it raised; who is cancelled, however often, is so once the work has ended.
+async def run_to_completion(work: Awaitable[Result]) -> Result:
+    """Await work that cannot be stopped; a cancellation, however often it comes, takes effect when the work has ended.
 
-    Until then it has its turn, its memory and its files.
+    So whoever awaits it keeps its turn, memory and files until then.
     """
     future = asyncio.ensure_future(work)
     try:
@@ -21,5 +21,5 @@ async def to_its_end(work: Awaitable[Result]) -> Result:
             with suppress(asyncio.CancelledError):
                 await asyncio.wait({future})
         if not future.cancelled():
-            future.exception()  # nobody is there to be told
+            future.exception()  # marks it as retrieved: nobody is left to raise it to
         raise

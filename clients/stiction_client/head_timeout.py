@@ -1,4 +1,4 @@
-"""Heads of answers that are whole in time: one that comes a byte at a time is read on by the network for minutes."""
+"""A time limit for the whole head of an answer: httpx limits single reads, so that one byte at a time takes minutes."""
 
 import math
 import time
@@ -9,10 +9,10 @@ from typing import Any
 import httpx
 
 _until: ContextVar[float] = ContextVar("until", default=math.inf)
-"""s of the clock that nobody sets, until when the head that is being read here has to be whole."""
+"""Monotonic time, s, by which the head that is being read has to be complete."""
 
 Trace = Callable[[str, Mapping[str, Any]], Any]
-"""What httpx tells of a request under way, as its extension ``trace``."""
+"""httpx's extension ``trace``: called with the name of each event of a request, and its details."""
 
 
 def bounded(seconds: float) -> Trace:

@@ -1,4 +1,4 @@
-"""Load what is compiled before anything is timed."""
+"""Compile or load the solver's kernels before a run is timed."""
 
 from functools import cache
 

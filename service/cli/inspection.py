@@ -1,4 +1,4 @@
-"""Look at a log on this machine: corrected by its sensor's calibration, with forces by its gel, and the slip in it."""
+"""Inspect a log on this machine: correct it by its sensor's calibration, reconstruct forces by its gel, detect slip."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -26,8 +26,8 @@ GelFile = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class InspectedLog:
-    """A log as it was looked at, the slip in it, the ``seconds`` of detection, and what is known of forces that are
-    not the sensor's own.
+    """A log as corrected, its slip, the ``seconds`` that detection took, and the ``reconstruction`` of its forces (None
+    where they are the sensor's own, or missing).
     """
 
     log: "GraspLog"
@@ -53,7 +53,7 @@ class InspectedLog:
         return [*reconstruction_findings(self.log, self.reconstruction), *check_log(self.log, self.history)]
 
 
-def look(
+def inspect_log(
     log: "GraspLog", method: str | None = None, sensor_model: Path | None = None, gel: Path | None = None
 ) -> InspectedLog:
     """Correct a log, reconstruct forces that it lacks, and detect slip in it."""
