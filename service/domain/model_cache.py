@@ -41,8 +41,8 @@ which costs a look at the database."""
 class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
-    ``read_at`` and ``until`` are s of the clock that nobody sets; ``because``: why this model,
-    where no method was named; ``disagreement`` with the material's models by other methods, where there is any.
+    ``read_at`` and ``until`` are s of the monotonic clock; ``because``: why this model, where no method was named;
+    ``disagreement`` with the material's models by other methods, where there is any.
     """
 
     stored: StoredModel

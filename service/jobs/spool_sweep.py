@@ -1,4 +1,8 @@
-"""Remove what killed processes left under way; a start that is alone does so, too, but there may be none for long."""
+"""Remove files that killed processes left in the spool.
+
+A server that starts alone in the folder clears it at once (``BlobStore.clear_spool``); beside others it never may, so
+each looks for what is old and held by nobody.
+"""
 
 import logging
 import time
@@ -10,16 +14,18 @@ from service.periodic_thread import PeriodicThread
 logger = logging.getLogger(__name__)
 
 LOOK_SECONDS = 60.0
-"""s between two looks into the folder."""
+"""Between two looks into the folder, s."""
 
 FILE_SECONDS, FOLDER_SECONDS = 3600.0, 86400.0
-"""s for which a file that nobody holds, and a folder, has to have been there: a file is held within a moment of its
-beginning, and a folder is some reader's, which has four hours at most.
+"""Age, s, from which a file that no process holds, and a folder, are removed. Processes lock a file as they create it, but
+no folder: one belongs to a reader, which has four hours at most.
 """
 
 
 class SpoolSweep:
-    """Looks now and then, in every process that works in the folder; by the clock that nobody sets."""
+    """Looks once in ``LOOK_SECONDS``, in every process that works in the folder; ages are by the monotonic clock, since
+    files' own times are by one that may be set.
+    """
 
     def __init__(self, blobs: BlobStore) -> None:
         self._blobs = blobs
@@ -35,12 +41,12 @@ class SpoolSweep:
         await self._thread.stop()
 
     def look(self) -> None:
-        """Remove what has been there for long enough and is nobody's."""
+        """Remove what was first seen long enough ago and is held by no process."""
         now = time.monotonic()
         self._seen = {path: self._seen.get(path, now) for path in self._blobs.under_way()}
         removed = sum(self._remove(path, now - seen) for path, seen in self._seen.items())
         if removed:
-            logger.warning("removed %d files or folders that killed processes had left under way", removed)
+            logger.warning("removed %d files or folders that killed processes had left in the spool", removed)
 
     def _remove(self, path: Path, seconds: float) -> bool:
         least = FOLDER_SECONDS if path.is_dir() else FILE_SECONDS

@@ -15,23 +15,23 @@ from db.tables import now
 logger = logging.getLogger(__name__)
 
 STEADY = timedelta(days=1)
-"""For which the clock has to go as the one that nobody sets does, once it has jumped; wrong ones are seen by then. Also
-how far it may go on where no server looks at it."""
+"""How long the clock must agree with the monotonic clock after a jump before it is believed: whoever runs the machine
+has seen a wrong one by then. Also the longest time that no server may have looked at it."""
 
 JUMP = timedelta(minutes=1)
-"""By which the two may part between two looks."""
+"""Largest difference between what the two clocks advance from one look to the next."""
 
 
 class Look(NamedTuple):
-    """What the clock said, ``at``, and what the one that nobody sets did then, s."""
+    """Readings of the two clocks at one moment: wall time ``at``, and the monotonic ``moment``, s."""
 
     at: datetime
     moment: float
 
 
 class SteadyClock:
-    """Compares the clock with the one that nobody sets, at each look; the database remembers over restarts for how long
-    it was steady.
+    """Compares the wall clock with the monotonic clock at each look; the database keeps over restarts for how long they
+    have agreed.
 
     Uploads go with it as it jumps ahead, since it may be right only now: none is older by that. Where another
     process has looked meanwhile, by a clock of its own maybe, the next look is as one after a restart.
@@ -51,7 +51,7 @@ class SteadyClock:
         """Whether it has been steady for long enough while a server looked, none of them for longer than ``STEADY``
         apart.
         """
-        look = Look(now(), _unset_clock())
+        look = Look(now(), _monotonic_seconds())
         with self._database.write(durable=False) as session:
             seen = stores.seen_clock(session, lock=True) or SeenClock(look.at, 0.0)
             last = self._last if self._last and self._last.at == seen.at else None  # else others looked meanwhile
@@ -68,8 +68,8 @@ class SteadyClock:
         return seen.steady >= STEADY.total_seconds()
 
 
-def _unset_clock() -> float:
-    """s of the clock that nobody sets, which goes on while the machine is asleep where the system has such a one."""
+def _monotonic_seconds() -> float:
+    """The monotonic clock, s: on Linux the one that goes on while the machine is asleep."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 
