@@ -17,9 +17,9 @@ from slipcore.detection.filter.state import (
     POSE,
     PROBABILITY,
     REFERENCE,
+    RESOLUTION,
     ROWS,
     STICK_VARIANCE,
-    TOLD_STEP,
 )
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
@@ -59,8 +59,8 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
         )
         remedy = "give the force of the object on the sensor, in its frame, as it is at the frame's time"
         found.append(Finding("forces not believed", evidence, remedy))
-    if common[TOLD_STEP] > 0.0:
-        evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"
+    if common[RESOLUTION] > 0.0:
+        evidence = f"all places of markers are multiples of {1e6 * common[RESOLUTION]:.3g} µm"
         found.append(Finding("rounded", evidence, "record places as finely as the tracker gives them"))
     elif common[LASTING] > NOISE.lasting_told:
         evidence = (

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from slipcore.compilation import compiled
 from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.pose import AnchorMotion
-from slipcore.detection.filter.state import EXPECTED, LIMITS, PROBABILITY, SPRING_X, SPRING_Y, TOUCH_DEPTH
+from slipcore.detection.filter.state import EXPECTED, LIMIT_LIKELIHOODS, PROBABILITY, SPRING_X, SPRING_Y, TOUCH_DEPTH
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import Memory
 from slipcore.frames import BoolArray, FloatArray
@@ -221,7 +221,7 @@ def step_limits(
     after, common = memory.elements, memory.common
     size, (rows, series) = COUNT + 1, room
     weights, shown_by = series[0, :size], series[1, :size]
-    found = common[LIMITS : LIMITS + size]
+    found = common[LIMIT_LIKELIHOODS : LIMIT_LIKELIHOODS + size]
     limit, count = weigh_limits(found, tuning, weights), len(places)
     depth, moved = follow_springs(elements, places, motion, surface, deviation, limit, after, rows)
     used = depth > tuning.slip_limit_depth * deviation * count and not measured

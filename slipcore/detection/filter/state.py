@@ -1,39 +1,79 @@
-"""Where the filter's memory holds what.
+"""Layout of the filter's memory: the rows of ``elements`` [20, n, m] and the entries of ``common`` [COMMON].
 
-An element's state is a column of ``elements`` [20, n, m]: its slip probability; where in the object's frame it would
-be if it stuck (x, y m, variance m²) and if it slipped (the same); its force low-passed (normal, tangential N); the
-force ratio that it slipped at with the weight of that knowledge; and how probable it was, before this frame was seen,
-that it began to slip if it stuck and that it stuck again if it slipped; which way the object moves over it (x, y), and
-whether its force points against that.
-
-``common`` is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); the share in
-which the surface follows the known motion (the same); the pose from which motion counts; for how long neither it nor
-the load has moved, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay from it in the
-last two frames, of how many frames that is known, and what second differences of it say of the noise of place, m, and
-yaw, rad; in how many frames of contact there were forces, and in how many they were not believed; how far the camera
-moved, x, y m; and of the markers around the contact the last step, x, y m, by how much it differed from the one before,
-and what such differences say of jitter, m²; and of the frames since object or load last moved how many there are, and
-the means of pose and of load (N, or without forces m); and of markers the step in which places come, m, and the noise
-that lasts from frame to frame, m; and the log-likelihoods of limits of slip, see ``slip_limit``.
+Both are arrays (``records.Memory``), for compiled steps fill them in place; the names here are their fields. A field of
+``common`` with more than one entry begins at its name, and the next field begins where it ends.
 """
 
 from slipcore.defaults import NOISE, NUMERICS
 
 ROWS = 20
 (
-    PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO,
-    RATIO_WEIGHT, ONSET, END, HEADING_X, HEADING_Y, OPPOSED,
-    TOUCH_DEPTH, SPRING_X, SPRING_Y, EXPECTED,
-) = range(ROWS)  # fmt: skip
-POSE, LOADING, FRICTION, FOLLOWING, REFERENCE, STILL = 0, 4, 10, 12, 14, 18
-CORRECTION, LAST_OFFSETS, OFFSET_FRAMES, NOISE_OF_PLACE = 19, 22, 28, 29
+    PROBABILITY,  # of slip
+    STICK_X,  # place in the object's frame if the element sticks, m
+    STICK_Y,
+    STICK_VARIANCE,  # of each coordinate of that, m²
+    SLIP_X,  # place in the object's frame if it slips, m
+    SLIP_Y,
+    SLIP_VARIANCE,
+    NORMAL,  # low-passed normal force, N
+    TANGENTIAL,  # low-passed tangential force, N
+    RATIO,  # force ratio at which it was seen to slip, times the next
+    RATIO_WEIGHT,  # weight of that knowledge
+    ONSET,  # probability, predicted before the frame was seen, that it began to slip if it stuck
+    END,  # and that it stuck again if it slipped
+    HEADING_X,  # mean direction in which the object moves over it
+    HEADING_Y,
+    OPPOSED,  # 1 where its force points against that direction, else 0
+    TOUCH_DEPTH,  # how deep it lay in the last frame before it touched, m
+    SPRING_X,  # what it has taken up of the object's motion since then, m (``slip_limit``)
+    SPRING_Y,
+    EXPECTED,  # log-odds of slip that follow from that
+) = range(ROWS)
+
+POSE = 0
+"""[4] Pose of the object: x, y m, yaw rad, stretch."""
+LOADING = POSE + 4
+"""[6] Low-passed rates of the load (``loading.Loading``)."""
+FRICTION = LOADING + 6
+"""[2] Force ratio of all that slips: weighted sum, weight."""
+FOLLOWING = FRICTION + 2
+"""[2] Share in which the object's surface follows its known motion: weighted sum, weight."""
+REFERENCE = FOLLOWING + 2
+"""[4] Pose from which motion counts, as ``POSE``."""
+STILL = REFERENCE + 4
+"""Time for which neither pose nor load has changed, s."""
+CORRECTION = STILL + 1
+"""[3] By which a given pose was corrected for its noise: x, y m, yaw rad."""
+LAST_OFFSETS = CORRECTION + 3
+"""[2 × 3] How far the pose fitted to the markers lay from the given one in the last two frames, likewise."""
+OFFSET_FRAMES = LAST_OFFSETS + 6
+"""Number of frames in which that was known."""
+NOISE_OF_PLACE = OFFSET_FRAMES + 1
+"""[1 + NOISE.memory] Ring of estimates of a given pose's noise of place, m (``noise.remember``)."""
 NOISE_OF_YAW = NOISE_OF_PLACE + 1 + NOISE.memory
+"""[1 + NOISE.memory] The same of its yaw, rad."""
 FORCE_FRAMES = NOISE_OF_YAW + 1 + NOISE.memory
+"""Number of frames in contact that had forces."""
 DOUBTED_FRAMES = FORCE_FRAMES + 1
+"""Number of these whose forces were not believed."""
 SHIFT = DOUBTED_FRAMES + 1
-STEP, BEND, JITTER = SHIFT + 2, SHIFT + 4, SHIFT + 6
+"""[2] How far the camera has moved, x and y m."""
+STEP = SHIFT + 2
+"""[2] Last step of the markers around the contact, x and y m."""
+BEND = STEP + 2
+"""[2] By how much it differed from the one before, m."""
+JITTER = BEND + 2
+"""[2] Fading sums of squares and products of such differences, m² (``surroundings.share_of_jitter``)."""
 HELD_FRAMES = JITTER + 2
-HELD_POSE, HELD_LOAD = HELD_FRAMES + 1, HELD_FRAMES + 5
-TOLD_STEP, LASTING = HELD_LOAD + 3, HELD_LOAD + 4
-LIMITS = HELD_LOAD + 5
-COMMON = LIMITS + NUMERICS.slip_limits + 1
+"""Number of frames since pose or load last changed."""
+HELD_POSE = HELD_FRAMES + 1
+"""[4] Mean pose over these."""
+HELD_LOAD = HELD_POSE + 4
+"""[3] Mean sum of forces over these, N; without forces the third is the sum of displacements along z, m."""
+RESOLUTION = HELD_LOAD + 3
+"""Step of which all places of markers are multiples, m; 0 where there is none."""
+LASTING = RESOLUTION + 1
+"""Noise of markers that lasts from frame to frame, m, where it is more than what three frames show; else 0."""
+LIMIT_LIKELIHOODS = LASTING + 1
+"""[NUMERICS.slip_limits + 1] Log-likelihoods of the limits of slip, and of there being none (``slip_limit``)."""
+COMMON = LIMIT_LIKELIHOODS + NUMERICS.slip_limits + 1

@@ -24,13 +24,13 @@ from slipcore.detection.filter.state import (
     POSE,
     PROBABILITY,
     REFERENCE,
+    RESOLUTION,
     SLIP_VARIANCE,
     SLIP_X,
     SLIP_Y,
     STICK_VARIANCE,
     STICK_X,
     STICK_Y,
-    TOLD_STEP,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.surroundings import shift_of_surroundings
@@ -83,9 +83,9 @@ def step_elements(
 ) -> None:
     """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
     surface = room.surface
-    marker_noise, _, between_neighbours, told_step = surface.noise
-    lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
-    after.common[TOLD_STEP] = told_step
+    marker_noise, _, between_neighbours, resolution = surface.noise
+    lasting = lasting_noise(marker_noise, between_neighbours, resolution, tuning)
+    after.common[RESOLUTION] = resolution
     after.common[LASTING] = lasting if lasting > known_or(marker_noise, tuning.unknown_noise) else 0.0
     variance, force_noise = noise_of_frame(surface, tuning)
     interval, common, elements = frame.time - last.time, before.common, before.elements
@@ -124,7 +124,9 @@ def step_elements(
     increment = Increment(interval, variance, restick, held)
     find_offsets(anchors, pose, places, room.offsets)
     # Neighbours blur where slip begins; only what no force shows is worth that.
-    beside = 0.0 if told_step > 0.0 or has_force else lasting * lasting / (lasting * lasting + tuning.pooling_length**2)
+    beside = (
+        0.0 if resolution > 0.0 or has_force else lasting * lasting / (lasting * lasting + tuning.pooling_length**2)
+    )
     scale = 4.0 * tuning.pooling_outlier * variance
     for e in range(len(places)):
         i, j = places[e]
@@ -150,8 +152,8 @@ def step_elements(
 @compiled(inline=True)
 def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     """Variance of a marker coordinate, m², and deviation of an element's force, N, that are reckoned with."""
-    marker_noise, pressing_noise, between_neighbours, told_step = surface.noise
-    lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
+    marker_noise, pressing_noise, between_neighbours, resolution = surface.noise
+    lasting = lasting_noise(marker_noise, between_neighbours, resolution, tuning)
     shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
     variance = shown**2 + max(lasting, tuning.displacement_floor) ** 2  # a floor that is given is lasting noise, too
     return variance, math.hypot(tuning.force_noise_margin * known_or(pressing_noise, 0.0), tuning.force_floor)

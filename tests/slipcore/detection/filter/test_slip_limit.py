@@ -10,7 +10,16 @@ import pytest
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter import slip_limit
 from slipcore.detection.filter.pose import AnchorMotion
-from slipcore.detection.filter.state import COMMON, EXPECTED, LIMITS, PROBABILITY, ROWS, SPRING_X, SPRING_Y, TOUCH_DEPTH
+from slipcore.detection.filter.state import (
+    COMMON,
+    EXPECTED,
+    LIMIT_LIKELIHOODS,
+    PROBABILITY,
+    ROWS,
+    SPRING_X,
+    SPRING_Y,
+    TOUCH_DEPTH,
+)
 from slipcore.detection.filter.tuning import Tuning, settings_of
 from slipcore.detection.shared.records import Memory
 from slipcore.frames import BoolArray, FloatArray
@@ -23,7 +32,7 @@ TUNING = Tuning(*settings_of(FilterOptions()))._replace(
 )  # fmt: skip
 NOISE = 1e-6
 DEPTHS = 1e-3 * np.linspace(0.1, 0.6, 11)
-NONE = LIMITS + slip_limit.COUNT
+NONE = LIMIT_LIKELIHOODS + slip_limit.COUNT
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +70,7 @@ class Contact:
     def weights(self) -> tuple[FloatArray, float]:
         """How probable each limit is and, last, that there is none; and the mean of the limits."""
         weights = np.zeros(slip_limit.COUNT + 1)
-        limit = unwrap(slip_limit.weigh_limits)(self.common[LIMITS : NONE + 1], self.tuning, weights)
+        limit = unwrap(slip_limit.weigh_limits)(self.common[LIMIT_LIKELIHOODS : NONE + 1], self.tuning, weights)
         return weights, limit
 
     def spring(self) -> FloatArray:
@@ -150,7 +159,7 @@ def test_depth_within_noise_says_nothing(depth: float) -> None:
     """As of markers that are seen in the plane alone."""
     contact = Contact(np.full(9, depth))
     assert not contact.step(1e-4, np.ones(9, bool)).any()
-    assert not contact.common[LIMITS : NONE + 1].any()
+    assert not contact.common[LIMIT_LIKELIHOODS : NONE + 1].any()
 
 
 def test_what_noise_does_to_a_depth_makes_the_rule_less_sure() -> None:
@@ -167,7 +176,7 @@ def test_before_anything_is_seen_the_usual_limit_holds_but_for_the_doubt() -> No
 
 def test_evidence_of_any_size_leaves_weights_finite() -> None:
     contact = Contact(DEPTHS)
-    contact.common[LIMITS : NONE + 1] = -1e6
+    contact.common[LIMIT_LIKELIHOODS : NONE + 1] = -1e6
     contact.common[NONE] = 0.0
     weights, limit = contact.weights()
     assert weights.tolist() == [0.0] * slip_limit.COUNT + [1.0]
