@@ -293,31 +293,31 @@ class BlobStore:
 
     def read_store_id(self) -> str | None:
         """The store that the blobs say they belong to; None where they don't say."""
-        told = self._told_store_id()
-        return None if told is None else told.removeprefix(UNSETTLED)
+        text = self._store_id_text()
+        return None if text is None else text.removeprefix(UNSETTLED)
 
     @property
     def is_settled(self) -> bool:
         """Whether the blobs belong to a store whose database is known to say so, too."""
-        told = self._told_store_id()
-        return told is not None and not told.startswith(UNSETTLED)
+        text = self._store_id_text()
+        return text is not None and not text.startswith(UNSETTLED)
 
     def cached_store_id(self) -> str | None:
         """The store of which the folder is no cache of an object store, but the only place; None elsewhere."""
-        told = None if self._remote is None else self._local_store_id()
-        return None if told is None else told.removeprefix(UNSETTLED)
+        text = None if self._remote is None else self._local_store_id()
+        return None if text is None else text.removeprefix(UNSETTLED)
 
     def write_store_id(self, store_id: str, *, settled: bool = True) -> None:
         """Let the blobs say, durably, which store they belong to; not ``settled``: or will, if the database agrees."""
-        told = store_id if settled else f"{UNSETTLED}{store_id}"
+        text = store_id if settled else f"{UNSETTLED}{store_id}"
         if self._remote is not None:
-            self._remote.write(STORE_ID, told)
+            self._remote.write(STORE_ID, text)
             return
         with disk_errors_named(), Spool(self._spool / uuid.uuid4().hex, self._name_store) as spool:
-            spool.write(f"{told}\n".encode())
+            spool.write(f"{text}\n".encode())
             spool.keep()
 
-    def _told_store_id(self) -> str | None:
+    def _store_id_text(self) -> str | None:
         return self._local_store_id() if self._remote is None else self._remote.read(STORE_ID)
 
     def _name_store(self, spooled: Path, _sha256: str) -> None:
@@ -410,8 +410,8 @@ def _remove(path: Path) -> None:
 def _identity(path: Path) -> tuple[int, int] | Path:
     """What a file or folder is by whichever name; one that is not there yet is its name."""
     with suppress(OSError):
-        told = path.stat()
-        return told.st_dev, told.st_ino
+        status = path.stat()
+        return status.st_dev, status.st_ino
     return path.resolve()
 
 
@@ -424,8 +424,8 @@ def _way_to(path: Path) -> set[tuple[int, int] | Path]:
 def _state(path: Path) -> tuple[int, ...]:
     """What is another once somebody has written to a file, or put another in its place."""
     with disk_errors_named():
-        told = path.stat()
-    return told.st_ino, told.st_size, told.st_mtime_ns
+        status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _hash(path: Path) -> str:

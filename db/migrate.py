@@ -84,7 +84,7 @@ def _refuse_losses(connection: Connection, revision: str, *, lose: bool) -> None
     found = MigrationContext.configure(connection).get_current_revision()
     undone = [each.module for each in _scripts().iterate_revisions(found, revision, select_for_downgrade=True)]
     stops, losses = (
-        [told for module in undone for told in _counted(connection, getattr(module, name, ()))]
+        [loss for module in undone for loss in _counted(connection, getattr(module, name, ()))]
         for name in ("STOPS_THE_WAY_BACK", "LOST_ON_THE_WAY_BACK")
     )
     connection.rollback()  # the migrations begin a transaction of their own

@@ -159,8 +159,8 @@ def watched(
     Each is compared with what its sensor shows, so that another sensor's gain passes for no change.
     """
     alarm = ChangeAlarm.init(rate, scatter_prior=scatter_prior)
-    told = [grasp_level(model.of_sensor(grasp.sensor), grasp) for grasp in grasps[-ALARM.longest :]]
-    return replace(alarm, levels=tuple(level for level, _ in told), variances=tuple(error for _, error in told))
+    levels = [grasp_level(model.of_sensor(grasp.sensor), grasp) for grasp in grasps[-ALARM.longest :]]
+    return replace(alarm, levels=tuple(level for level, _ in levels), variances=tuple(error for _, error in levels))
 
 
 def _log_evidence(level: FloatArray, variance: FloatArray, shift: float, scatter_prior: ScatterPrior) -> FloatArray:

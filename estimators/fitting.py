@@ -65,13 +65,13 @@ def fit(
         return _with_areas(model, samples, areas)
     choice = choose(data)
     model = hierarchical.fit(choice.data, scatter_prior)
-    told = {"chosen_because": choice.reason, "check": compared(model, choice.data), **areas}
-    return _with_areas(model, samples, told)
+    added = {"chosen_because": choice.reason, "check": compared(model, choice.data), **areas}
+    return _with_areas(model, samples, added)
 
 
-def _with_areas(model: FrictionModel, samples: GraspData, told: Diagnostics) -> FrictionModel:
+def _with_areas(model: FrictionModel, samples: GraspData, added: Diagnostics) -> FrictionModel:
     """The model with these diagnostics, and with the area of the elements of each sensor that it knows."""
-    model = replace(model, diagnostics={**model.diagnostics, **told}) if told else model
+    model = replace(model, diagnostics={**model.diagnostics, **added}) if added else model
     known = None if model.scales is None else model.scales.between_sensors
     if model.scales is None or known is None:
         return model

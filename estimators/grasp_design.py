@@ -115,7 +115,7 @@ def next_grasp(
     after = np.sqrt(np.maximum(point @ left @ point, 0.0))
     best = int(np.argmax((math.sqrt(variance) - after) / designs.seconds))
     score = float(special.stdtrit(model.degrees_of_freedom, IDENTIFIABILITY.ends[1]))
-    told = model.predict(point[1], point[2], working_point.quantile, "contact", working_point.elements)
+    conservative = model.predict(point[1], point[2], working_point.quantile, "contact", working_point.elements)
     return NextGrasp(
         normal_force=float(designs.normal_force[best]),
         slip_length=float(designs.length[best]),
@@ -124,7 +124,7 @@ def next_grasp(
         seconds=float(designs.seconds[best]),
         uncertainty=score * math.sqrt(variance),
         after=score * float(after[best]),
-        conservative_friction=float(told),
+        conservative_friction=float(conservative),
     )
 
 
@@ -134,8 +134,8 @@ def updated(covariance: FloatArray, roots: FloatArray) -> FloatArray:
     With Σ = LLᵀ and RL = USVᵀ it is LV(1 + S²)⁻¹VᵀLᵀ: nothing is squared, and Σ [3, 3] or R may be singular.
     """
     root = _root(covariance)
-    _, told, along = np.linalg.svd(roots @ root)
-    left = root @ (along.swapaxes(-1, -2) / np.hypot(1.0, told)[..., None, :])
+    _, singular, along = np.linalg.svd(roots @ root)
+    left = root @ (along.swapaxes(-1, -2) / np.hypot(1.0, singular)[..., None, :])
     return np.asarray(left @ left.swapaxes(-1, -2))
 
 
@@ -204,8 +204,8 @@ def scatter(model: FrictionModel) -> tuple[float, float, float]:
         middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
         friction = abs(float(np.dot(middle, model.coefficients)))
         return model.scale / max(friction, least), 0.0, max(model.scale, least)
-    told: Scales = model.scales
-    return told.between_grasps.value, told.between_places.value, max(told.within.value, least)
+    scales: Scales = model.scales
+    return scales.between_grasps.value, scales.between_places.value, max(scales.within.value, least)
 
 
 def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> FloatArray:

@@ -58,11 +58,11 @@ def _effect(model: FrictionModel, grasp: GraspStatistics, unit: float) -> GraspE
     assert model.scales is not None
     law, residual = np.append(model.coefficients, 0.0), np.append(-model.coefficients, 1.0)
     square = _square(grasp, unit, model.scales.between_places.value, model.scales.within.value)
-    told = square @ law
+    projected = square @ law
     before = model.scales.between_grasps.value**2
-    variance = before / (1.0 + before * float(told @ law))
-    value = float(variance * (told @ residual))
-    gradient = -variance * told[:3]
+    variance = before / (1.0 + before * float(projected @ law))
+    value = float(variance * (projected @ residual))
+    gradient = -variance * projected[:3]
     own = variance + (_offset_variance(model, grasp, gradient) if grasp.velocity_unknown else 0.0)
     level = IDENTIFIABILITY.ends[1]
     uncertain = special.stdtrit(model.degrees_of_freedom, level) ** 2 * (gradient @ model.covariance @ gradient)
@@ -79,8 +79,8 @@ def _square(grasp: GraspStatistics, unit: float, places: float, within: float) -
     inverse = 1.0 / (places**2 + within**2 / (unit * grasp.weight))
     means = np.sqrt(inverse * grasp.independent)[:, None] * np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
     spread = (np.sqrt(inverse * grasp.share)[:, None, None] * grasp.spread).reshape(-1, 3)
-    told = 0.0 if grasp.of_one_place else np.sqrt(unit) / within
-    deviations = np.concatenate([spread, told * grasp.within])
+    per_deviation = 0.0 if grasp.of_one_place else np.sqrt(unit) / within
+    deviations = np.concatenate([spread, per_deviation * grasp.within])
     rows = np.concatenate([means, np.pad(deviations, ((0, 0), (1, 0)))])
     return np.asarray(rows.T @ rows)
 

@@ -231,6 +231,6 @@ def complaints(error: ValidationError) -> str:
 
 def _complaint(name: str, value: object, message: str) -> str:
     field = Settings.model_fields.get(name)
-    told = repr(str(value))[:100] if field is not None and field.repr else "not one that is allowed"
+    shown = repr(str(value))[:100] if field is not None and field.repr else "not one that is allowed"
     allowed = message.removeprefix("Input should be ").removeprefix("Value error, ")
-    return f"{PREFIX}{name.upper()} is {told}; allowed: {allowed} (docs/settings.md)"
+    return f"{PREFIX}{name.upper()} is {shown}; allowed: {allowed} (docs/settings.md)"

@@ -318,10 +318,10 @@ def friction(name: str, question: Mapping[str, float | str | None], known: Names
     """Look friction up."""
     asked = _given(**question)
     answer = _record(FrictionAnswer.from_json, (yield from _get(f"/v1/materials/{_part(name)}/friction", asked)))
-    told = {ECHOED[each]: value for each, value in asked.items() if each in ECHOED}
-    if told.get("of") == "element":
-        told.pop("elements", None)  # of one, whatever was said
-    _require_same(told, answer)
+    echoed = {ECHOED[each]: value for each, value in asked.items() if each in ECHOED}
+    if echoed.get("of") == "element":
+        echoed.pop("elements", None)  # of one, whatever was said
+    _require_same(echoed, answer)
     yield from _require_named(name, answer.material, known)
     return answer
 

@@ -53,8 +53,8 @@ def coefficient_html(title: str, rows: Sequence[Row], below: str) -> str:
     """A table of the coefficients, and a sentence below it; both are escaped."""
     head = "".join(f"<th>{name}</th>" for name in ("", "estimate", "95 % interval"))
     lines = "".join(
-        f"<tr><th>{symbol}{'' if told else ' †'}</th><td>{value:.4g}</td><td>{low:.4g} … {high:.4g}</td></tr>"
-        for symbol, (value, _, low, high, told) in zip(SYMBOLS, rows, strict=False)
+        f"<tr><th>{symbol}{'' if identifiable else ' †'}</th><td>{value:.4g}</td><td>{low:.4g} … {high:.4g}</td></tr>"
+        for symbol, (value, _, low, high, identifiable) in zip(SYMBOLS, rows, strict=False)
     )
     note = "" if all(row[-1] for row in rows) else " † not determined by the data."
     return f"<div><strong>{escape(title)}</strong><table><tr>{head}</tr>{lines}</table>{escape(below)}.{note}</div>"

@@ -90,12 +90,12 @@ class SensorFriction:
 
     def to_json(self) -> dict[str, Any]:
         """What ``from_json`` reads."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
         if self.element_area is None:
-            del told["element_area"]
+            del values["element_area"]
         degrees = ("degrees_of_freedom", "scatter_degrees_of_freedom")
         lists = {"coefficients": list(self.coefficients), "covariance": [list(row) for row in self.covariance]}
-        return told | lists | {name: degrees_to_json(told[name]) for name in degrees}
+        return values | lists | {name: degrees_to_json(values[name]) for name in degrees}
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +150,8 @@ class Scales:
 
     def to_json(self) -> dict[str, Any]:
         """What ``from_json`` reads; without ``between_sensors`` where grasps are of one."""
-        told = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {name: scale.to_json() for name, scale in told.items() if scale is not None}
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: scale.to_json() for name, scale in values.items() if scale is not None}
 
 
 class LinearFriction:
@@ -307,8 +307,8 @@ class LinearFriction:
 
     def _of_unknown_sensor(self, name: str, known: Iterable[str]) -> Self:
         near = "".join(f" (did you mean {each!r}?)" for each in difflib.get_close_matches(name, known, n=1))
-        told = f"no grasp of it is by a sensor {name!r}{near}: the answer allows for the gain of any sensor"
-        return replace(self, diagnostics={**self.diagnostics, UNKNOWN_SENSOR: told})  # type: ignore[type-var]
+        note = f"no grasp of it is by a sensor {name!r}{near}: the answer allows for the gain of any sensor"
+        return replace(self, diagnostics={**self.diagnostics, UNKNOWN_SENSOR: note})  # type: ignore[type-var]
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -357,8 +357,8 @@ class LinearFriction:
         """Coefficients and covariance with their names; raises ``ModuleNotFoundError`` where xarray is missing."""
         from stiction_client.labelled import coefficient_dataset
 
-        told = self.coefficients, self.covariance, self.identifiable, self.scale
-        return coefficient_dataset(*told, method=self.method, samples=self.n)
+        shown = self.coefficients, self.covariance, self.identifiable, self.scale
+        return coefficient_dataset(*shown, method=self.method, samples=self.n)
 
     def _repr_html_(self) -> str:
         from stiction_client.labelled import coefficient_html
@@ -369,9 +369,9 @@ class LinearFriction:
     def _rows(self) -> "list[Row]":
         """What a table shows of each coefficient and of σ."""
         bounds = [*self.interval(0.95).tolist(), list(self.scale_interval(0.95))]
-        values, told = [*self.coefficients.tolist(), self.scale], [*self.identifiable.tolist(), True]
+        values, identifiable = [*self.coefficients.tolist(), self.scale], [*self.identifiable.tolist(), True]
         errors = [*self.standard_errors.tolist(), self.scale / math.sqrt(2.0 * self.scatter_degrees_of_freedom)]
-        return [(*each[:2], *each[2], each[3]) for each in zip(values, errors, bounds, told, strict=True)]
+        return [(*each[:2], *each[2], each[3]) for each in zip(values, errors, bounds, identifiable, strict=True)]
 
     def _check_probability(self, name: str, value: float) -> None:
         if not 0.0 < value < 1.0:

@@ -96,10 +96,10 @@ class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
 
     def _number(self, name: str) -> float:
         """A number of the problem; NaN where it tells none."""
-        told = self.facts.get(name)
-        if isinstance(told, bool) or not isinstance(told, int | float) or not abs(told) <= sys.float_info.max:
+        value = self.facts.get(name)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
             return math.nan
-        return float(told)
+        return float(value)
 
 
 class JobEnded(ProblemError):

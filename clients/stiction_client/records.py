@@ -230,12 +230,12 @@ class FrictionAnswer:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
         """The lookup in the service's answer; raises ``ValueError`` for numbers that no friction has."""
-        told = _values(cls, record) | {"notes": tuple(record.get("notes", ()))}
+        values = _values(cls, record) | {"notes": tuple(record.get("notes", ()))}
         for name in ("friction_coefficient", "tangential_velocity", "normal_force"):
-            told[name] = json_values.number(name, told[name], least=0.0)
-        told["mean"] = json_values.number("mean", told["mean"])
-        told["within_domain"] = json_values.truth("within_domain", told["within_domain"])
-        return cls(**told)
+            values[name] = json_values.number(name, values[name], least=0.0)
+        values["mean"] = json_values.number("mean", values["mean"])
+        values["within_domain"] = json_values.truth("within_domain", values["within_domain"])
+        return cls(**values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,13 +264,13 @@ class NextGrasp:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "NextGrasp":
         """The grasp in the service's answer; raises ``ValueError`` for numbers that no grasp has."""
-        told = _values(cls, record)
-        told["normal_force"] = json_values.number("normal_force", told["normal_force"], above=0.0)
+        values = _values(cls, record)
+        values["normal_force"] = json_values.number("normal_force", values["normal_force"], above=0.0)
         for name in ("slip_length", "speed", "seconds", "uncertainty", "after"):
-            told[name] = json_values.number(name, told[name], least=0.0)
+            values[name] = json_values.number(name, values[name], least=0.0)
         for name in ("direction", "conservative_friction"):
-            told[name] = json_values.number(name, told[name])
-        return cls(**told)
+            values[name] = json_values.number(name, values[name])
+        return cls(**values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,8 +149,8 @@ def kinds(
         return np.full(v.shape, "implausible")
     if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
-    told = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
-    unknown = ~told | ((v > 0.0) & _knows_no_velocity(model)) | _knows_no_scatter(model)
+    identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
+    unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | _knows_no_scatter(model)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
     return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
@@ -170,17 +170,17 @@ def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str 
         gap = np.abs(mean - expected) - (half + spread)
         at = int(np.argmax(gap))
         if gap[at] > 0.0:
-            told = f"{name} expects {expected[at]:.3g} ± {spread[at]:.2g}, {method} {mean[at]:.3g} ± {half[at]:.2g}"
+            each = f"{name} expects {expected[at]:.3g} ± {spread[at]:.2g}, {method} {mean[at]:.3g} ± {half[at]:.2g}"
             where = f"at {v[at]:.4g} m/s and {f_n[at]:.4g} N an element"
-            return f"methods disagree by more than their intervals allow: {told} {where}; look at the samples"
+            return f"methods disagree by more than their intervals allow: {each} {where}; look at the samples"
     return None
 
 
 def uncertainty(model: Model, tangential_velocity: Number, normal_force: Number) -> Number:
     """Half-width of the 95 % interval of the friction expected at v and f_n, in parts of it."""
     mean, half = _interval(model, tangential_velocity, normal_force)
-    told = mean > 1e-9 * half  # else it is nothing beside its uncertainty
-    return select(told, half / select(told, mean, 1.0), math.inf)
+    measurable = mean > 1e-9 * half  # else it is nothing beside its uncertainty
+    return select(measurable, half / select(measurable, mean, 1.0), math.inf)
 
 
 def within(domain: Domain, tangential_velocity: Number, normal_force: Number) -> tuple[Number, Number]:

@@ -292,8 +292,8 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
     contact = None if row.contact_friction is None else ContactFriction(**row.contact_friction)
     corrections = None if row.corrections is None else tuple(row.corrections)
     gel = None if row.gel is None else Gel(**row.gel)
-    told = {"findings": findings, "contact_friction": contact, "corrections": corrections, "gel": gel}
-    return Detection(**found | told)
+    nested = {"findings": findings, "contact_friction": contact, "corrections": corrections, "gel": gel}
+    return Detection(**found | nested)
 
 
 def samples_record(row: SampleSummaryRow | None, *, with_moments: bool = True) -> SampleSummary | None:

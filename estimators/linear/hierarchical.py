@@ -191,8 +191,8 @@ class Hierarchical:
         ``scales``: log σ, log λ, log ρ and, of several sensors, log ν, [3 or 4, k].
         """
         log_sigma, log_lambda, log_rho, *log_nu = scales
-        told, determinant = self._without_offset(whole, log_sigma)
-        square = told + self.prior
+        square_of_data, determinant = self._without_offset(whole, log_sigma)
+        square = square_of_data + self.prior
         precision = square[:, WHOLE[:3, :3]]
         covariance = np.linalg.inv(precision)
         gamma = np.einsum("kij,kj->ki", covariance, square[:, WHOLE[:3, 3]])

@@ -36,10 +36,10 @@ class ScatterPrior:
                 raise InvalidSamples(f"{name} of the prior of scatter", value, allowed)
 
     def __str__(self) -> str:
-        told = f"tau ~ half-Student-t on {self.degrees_of_freedom:.3g} degrees of freedom with scale {self.scale:.3g}"
+        law = f"tau ~ half-Student-t on {self.degrees_of_freedom:.3g} degrees of freedom with scale {self.scale:.3g}"
         if self.materials:
-            return f"{told}, from {self.materials} other material{'s' * (self.materials > 1)}"
-        return f"{told}, the default" if self == ScatterPrior() else told
+            return f"{law}, from {self.materials} other material{'s' * (self.materials > 1)}"
+        return f"{law}, the default" if self == ScatterPrior() else law
 
     def log_density(self, tau: FloatArray) -> FloatArray:
         """Of τ, up to a constant."""

@@ -34,9 +34,9 @@ def choose(data: FitData) -> Choice:
         part = float(np.average(distance > AUTOMATIC.half_weight, weights=data.observations.weight))
         if part > AUTOMATIC.downweighted and part * data.n >= AUTOMATIC.least_outliers:
             near = distance <= AUTOMATIC.far
-            told = f"{part:.1%} of the samples lie far off their place; normal errors leave 1.1%"
+            reason = f"{part:.1%} of the samples lie far off their place; normal errors leave 1.1%"
             return Choice(
-                data.kept(near), f"{told}; without the {np.count_nonzero(~near)} beyond {AUTOMATIC.far:g} deviations"
+                data.kept(near), f"{reason}; without the {np.count_nonzero(~near)} beyond {AUTOMATIC.far:g} deviations"
             )
     return Choice(data, "friction may scatter between grasps, between places and within them")
 

@@ -68,12 +68,12 @@ def _of_clusters(data: FitData, linear: LinearFit, errors: CoefficientErrors) ->
     """The errors by coefficient, and what statsmodels says beside them."""
     if data.clusters < 2:
         return {}
-    told = by_coefficient("standard_error_cluster", errors.standard)
-    told |= by_coefficient("degrees_of_freedom", errors.degrees)
+    found = by_coefficient("standard_error_cluster", errors.standard)
+    found |= by_coefficient("degrees_of_freedom", errors.degrees)
     observations = data.observations
     if observations is not None and len(observations) <= LINEAR.statsmodels:
-        told |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
-    return told
+        found |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
+    return found
 
 
 def _of_blocks(data: FitData, linear: LinearFit) -> Rows:

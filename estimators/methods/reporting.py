@@ -54,8 +54,8 @@ def element_areas(samples: GraspData) -> Diagnostics:
     least, most = (f"{1e6 * choose(part.element_area for part in parts):.3g}" for choose in (min, max))
     if least == most:
         return {}
-    told = f"its grasps are by elements of {least} to {most} mm²"
-    return {ELEMENT_AREAS: f"{told}: normal forces are those of one of {least} mm², unless its area is given"}
+    areas = f"its grasps are by elements of {least} to {most} mm²"
+    return {ELEMENT_AREAS: f"{areas}: normal forces are those of one of {least} mm², unless its area is given"}
 
 
 def areas_of_sensors(samples: GraspData) -> dict[str, float]:
@@ -170,10 +170,10 @@ def report(
 
 def _scale_diagnostics(scales: Scales) -> Diagnostics:
     """Scales as diagnostics, under names that JSON can carry."""
-    told: Diagnostics = {}
+    found: Diagnostics = {}
     for name in ("between_grasps", "between_places", "within"):
         scale = getattr(scales, name)
-        told |= {f"scale_{name}": scale.value, f"scale_{name}_degrees_of_freedom": scale.degrees_of_freedom}
+        found |= {f"scale_{name}": scale.value, f"scale_{name}_degrees_of_freedom": scale.degrees_of_freedom}
     if scales.between_sensors is not None:
-        told["scale_between_sensors"] = scales.between_sensors.scale.value
-    return told
+        found["scale_between_sensors"] = scales.between_sensors.scale.value
+    return found

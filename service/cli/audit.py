@@ -32,9 +32,8 @@ def audit(
         print_table("Audit trail", COLUMNS, [[entry[name] for name in COLUMNS] for entry in found])
 
 
-def _details(told: dict[str, Any]) -> str:
+def _details(details: dict[str, Any]) -> str:
     """What an entry says beside its names: without what is empty, and a hash by its beginning."""
-    shown = {
-        name: value[:12] if name == "sha256" else value for name, value in told.items() if value not in (None, "", [])
-    }
+    filled = {name: value for name, value in details.items() if value not in (None, "", [])}
+    shown = {name: value[:12] if name == "sha256" else value for name, value in filled.items()}
     return ", ".join(f"{name}: {value if isinstance(value, str) else dumps(value)}" for name, value in shown.items())

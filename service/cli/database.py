@@ -42,8 +42,8 @@ def _tell_keys(database: "Database") -> None:
     with database.read() as session:
         valid = sum(is_valid(key) for key in access_keys.list_all(session))
     if valid:
-        told = "valid as in the backup: revoke those that were revoked since (`stiction keys list`)"
-        typer.echo(f"{valid} access key(s) are {told}", err=True)
+        remark = "valid as in the backup: revoke those that were revoked since (`stiction keys list`)"
+        typer.echo(f"{valid} access key(s) are {remark}", err=True)
 
 
 def _tell_without(left_out: list[str]) -> str:

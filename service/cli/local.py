@@ -96,8 +96,9 @@ def check(
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
-        told = {"log": log.name, "findings": [_finding_record(each) for each in findings], "contact_friction": contact}
-        print_json(told if compared is None else told | {"forces_by_gel": asdict(compared)})
+        found = [_finding_record(each) for each in findings]
+        record = {"log": log.name, "findings": found, "contact_friction": contact}
+        print_json(record if compared is None else record | {"forces_by_gel": asdict(compared)})
         return
     for finding in findings:
         typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
@@ -238,9 +239,9 @@ def mapping_text(path: Path | None) -> str | None:
     return path.read_text(encoding="utf-8")
 
 
-def rest_of(told: str | None) -> str | Path | None:
+def rest_of(rest: str | None) -> str | Path | None:
     """The word or number that names a frame at rest, or a file that shows the sensor alone."""
-    return Path(told) if told is not None and Path(told).is_file() else told
+    return Path(rest) if rest is not None and Path(rest).is_file() else rest
 
 
 def print_comparison(found: "ForceComparison") -> None:

@@ -28,9 +28,9 @@ def printable(text: str) -> str:
 
 def print_lines(title: str, lines: Iterable[tuple[str, str | None]]) -> None:
     """Print what is known of one thing, a line for each name and what is said of it; those of None are left out."""
-    told = [(name, text) for name, text in lines if text is not None]
-    width = max(len(name) for name, _ in told)
-    typer.echo("\n".join(printable(line) for line in (title, *(f"  {name:<{width}}  {text}" for name, text in told))))
+    known = [(name, text) for name, text in lines if text is not None]
+    width = max(len(name) for name, _ in known)
+    typer.echo("\n".join(printable(line) for line in (title, *(f"  {name:<{width}}  {text}" for name, text in known))))
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], width: int = LINE_WIDTH) -> None:

@@ -159,7 +159,7 @@ def next_grasp(
     """Say which grasp to record next, to know friction best per second of robot time."""
 
     with connected(url, key) as client:
-        told = client.next_grasp(
+        grasp = client.next_grasp(
             material,
             normal_force,
             velocity,
@@ -170,9 +170,9 @@ def next_grasp(
             drop_probability=drop_probability,
         )
     if json:
-        print_json(asdict(told))
+        print_json(asdict(grasp))
     else:
-        print_lines(f"Record next of {material}", _probe_lines(told))
+        print_lines(f"Record next of {material}", _probe_lines(grasp))
 
 
 def plan(
@@ -271,8 +271,8 @@ def _upload(
     findings = () if detection is None else detection.findings or ()
     for finding in findings:
         typer.echo(f"{source.name}: {finding.name}: {finding.evidence}; {finding.remedy}", err=True)
-    told = {**asdict(job), "findings": [asdict(each) for each in findings]}
-    return {"file": source.name, "grasp_log": receipt.id, **told}
+    outcome = {**asdict(job), "findings": [asdict(each) for each in findings]}
+    return {"file": source.name, "grasp_log": receipt.id, **outcome}
 
 
 def _middle_force(model: "FrictionModel") -> float:
@@ -302,15 +302,15 @@ def _support(support: str, advice: str | None, warning: str | None) -> str:
     return support if advice is None or advice in (warning or "") else f"{support}: {advice}"
 
 
-def _probe_lines(told: "NextGrasp") -> list[tuple[str, str | None]]:
-    length, speed = number(told.slip_length * 1e3), number(told.speed * 1e3)
-    slip = f"{length} mm at {speed} mm/s, towards {number(told.direction)} rad"
+def _probe_lines(grasp: "NextGrasp") -> list[tuple[str, str | None]]:
+    length, speed = number(grasp.slip_length * 1e3), number(grasp.speed * 1e3)
+    slip = f"{length} mm at {speed} mm/s, towards {number(grasp.direction)} rad"
     return [
-        ("press with", f"{number(told.normal_force)} N an element"),
+        ("press with", f"{number(grasp.normal_force)} N an element"),
         ("slip by", slip),
-        ("takes", f"{number(told.seconds)} s"),
-        ("known to", f"± {number(told.uncertainty)} now, ± {number(told.after)} after that"),
-        ("support", f"{told.support}: {told.advice}"),
+        ("takes", f"{number(grasp.seconds)} s"),
+        ("known to", f"± {number(grasp.uncertainty)} now, ± {number(grasp.after)} after that"),
+        ("support", f"{grasp.support}: {grasp.advice}"),
     ]
 
 

@@ -85,11 +85,11 @@ async def _work(settings: "Settings") -> None:
 
     from service.app import running
 
-    told = asyncio.Event()
+    stopping = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, told.set)
+        asyncio.get_running_loop().add_signal_handler(number, stopping.set)
     async with running(settings) as context:
-        ends = [asyncio.ensure_future(end) for end in (told.wait(), context.jobs.until_outdated())]
+        ends = [asyncio.ensure_future(end) for end in (stopping.wait(), context.jobs.until_outdated())]
         done, waiting = await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         for end in waiting:
             end.cancel()

@@ -103,14 +103,14 @@ def calibrate(
     if output is not None:
         refuse_inputs(output, *logs, mapping)
     forces = _known_forces(known_force, len(logs))
-    told = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
+    calibration = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
     if output is not None:
-        write_whole(output, lambda beside: beside.write_text(dumps(told), encoding="utf-8"))
+        write_whole(output, lambda beside: beside.write_text(dumps(calibration), encoding="utf-8"))
     if json:
-        print_json(told)
+        print_json(calibration)
     else:
-        rows = [_estimate_cells(each) for each in told["estimates"]]
-        version = f", version {told['version']}" if store else ""
+        rows = [_estimate_cells(each) for each in calibration["estimates"]]
+        version = f", version {calibration['version']}" if store else ""
         print_table(f"Calibration by {len(logs)} logs{version}", ("", "estimate", "95 % interval", ""), rows)
 
 
@@ -151,17 +151,17 @@ def calibrate_gel(
     name = _sensor_name(sensor, presses[0].sensor) if store else ""
     with shown_progress("learning the gel"):
         found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise)
-    told = found.to_json()
+    calibration = found.to_json()
     if output is not None:
-        write_whole(output, lambda beside: beside.write_text(dumps(told["gel"]), encoding="utf-8"))
+        write_whole(output, lambda beside: beside.write_text(dumps(calibration["gel"]), encoding="utf-8"))
     if store:
         deep = found.gel.thickness if found.gel.thickness <= THICKEST else None
         with connected(url, key) as client:
             client.describe_sensor(name, found.gel.young_modulus, found.gel.poisson_ratio, deep, marker_depth)
     if json:
-        print_json(told)
+        print_json(calibration)
     else:
-        rows = [_gel_cells(each) for each in told["estimates"]]
+        rows = [_gel_cells(each) for each in calibration["estimates"]]
         stored = f", by which {name} is described" if store else ""
         print_table(f"Gel by {len(logs)} logs{stored}", ("", "estimate", "95 % interval", "by the presses", ""), rows)
 

@@ -35,11 +35,11 @@ def found(paths: Sequence[Path], mapping: Path | None, **table: Any) -> list[Sou
     from service.formats.mapping import parse
 
     text = mapping_text(mapping)
-    told = None if text is None else loads(parse(text).text)
+    entries = None if text is None else loads(parse(text).text)
     return [
         source
         for path in paths
-        for source in (_of_folder(path, told, table) if path.is_dir() else [_file(path, told, table)])
+        for source in (_of_folder(path, entries, table) if path.is_dir() else [_file(path, entries, table)])
     ]
 
 

@@ -88,8 +88,8 @@ def _replay(live: "SlipStream", log: "GraspLog", speed: float) -> Iterator[dict[
     gripper, deviation = log.gripper_force, log.gripper_force_deviation
     for k, time in enumerate(log.time.tolist()):
         sleep(max(began + (time - first) / speed - perf_counter(), 0.0))
-        told = {} if gripper is None else {"gripper_force": gripper[k], "gripper_force_deviation": deviation}
-        yield live.step(time, *(None if array is None else array[k] for array in arrays), **told)  # type: ignore[arg-type]
+        report = {} if gripper is None else {"gripper_force": gripper[k], "gripper_force_deviation": deviation}
+        yield live.step(time, *(None if array is None else array[k] for array in arrays), **report)  # type: ignore[arg-type]
 
 
 def _summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
@@ -117,11 +117,11 @@ def _lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
 
 
 def _why_none(findings: list[dict[str, str]]) -> str:
-    told = [f"{finding['evidence']}; {finding['remedy']}" for finding in findings]
-    return f"no samples: {'; '.join(told) or 'nothing slipped, or there are no forces'}"
+    reasons = [f"{finding['evidence']}; {finding['remedy']}" for finding in findings]
+    return f"no samples: {'; '.join(reasons) or 'nothing slipped, or there are no forces'}"
 
 
 def _friction(found: dict[str, Any]) -> str:
     error = found["standard_errors"][0]
-    told = f" ± {number(error)}" if (inf if error is None else error) < inf else ""
-    return f"β₀ = {number(found['coefficients'][0])}{told} (standard error), from {found['samples']} samples"
+    deviation = f" ± {number(error)}" if (inf if error is None else error) < inf else ""
+    return f"β₀ = {number(found['coefficients'][0])}{deviation} (standard error), from {found['samples']} samples"

@@ -90,8 +90,8 @@ def reasons(jobs: Iterable[tuple[str, Job]]) -> list[Table]:
 def _fitted(model: FrictionModel, truth: FrictionLaw | None) -> list[str]:
     halves = 0.5 * np.diff(model.interval(0.95), axis=1).ravel()
     cells = [
-        f"{number(value)} ± {number(half, 2)}{'' if told else ' †'}"
-        for value, half, told in zip(model.coefficients, halves, model.identifiable, strict=True)
+        f"{number(value)} ± {number(half, 2)}{'' if identifiable else ' †'}"
+        for value, half, identifiable in zip(model.coefficients, halves, model.identifiable, strict=True)
     ]
     return [*cells, number(model.scale), "unknown" if truth is None else f"{truth.coefficients[0]:g}"]
 

@@ -54,14 +54,14 @@ def _without_samples(log: GraspLog, history: SlipHistory) -> str:
 def _without_forces(log: GraspLog) -> str:
     from service.domain.sensors import NAMELESS  # with the database, which local commands go without
 
-    told = "the log has no forces; friction is tangential over normal force. "
+    reason = "the log has no forces; friction is tangential over normal force. "
     if left_out := log.metadata.get("columns_left_out"):
-        told += f"If they are among the columns that were left out ({left_out[:80]}), say which in a mapping. "
+        reason += f"If they are among the columns that were left out ({left_out[:80]}), say which in a mapping. "
     if log.sensor in NAMELESS:
         gel = "describe its gel, from which forces follow, and send the log again with the sensor's name (`sensor=`)"
     else:
         gel = f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
-    return f"{told}If a sensor sees only its markers move, {gel}"
+    return f"{reason}If a sensor sees only its markers move, {gel}"
 
 
 def _bound(contact: ContactFriction | None) -> str | None:

@@ -32,8 +32,8 @@ def create(session: Session, settings: Settings, name: str, description: str, pr
     made = materials.create(session, name, description)
     for owner in principal.owners:
         owners.add(session, made.id, owner)
-    told = {"description": description, "owners": list(principal.owners)}
-    record(session, principal, "material.created", name, told)
+    details = {"description": description, "owners": list(principal.owners)}
+    record(session, principal, "material.created", name, details)
     return made
 
 
@@ -103,9 +103,9 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
         if target_id == source_id:
             raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
-        told = {"source": materials.own_name(session, source_id)}
+        details = {"source": materials.own_name(session, source_id)}
         materials.merge(session, target_id, source_id)
-        record_of_material(session, principal, "material.merged", target_id, told)
+        record_of_material(session, principal, "material.merged", target_id, details)
         queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
         _check_aliases(merged)
@@ -128,8 +128,8 @@ def begin_epoch(
         except NotFound as error:
             raise InvalidValue("first_grasp_log", first_log, f"a log of {material}, or null") from error
         if withdrawn:
-            told = {"reason": because, "first_grasp_log": first_log, "withdrawn": len(withdrawn)}
-            record_of_material(session, principal, "material.epoch_begun", material_id, told)
+            details = {"reason": because, "first_grasp_log": first_log, "withdrawn": len(withdrawn)}
+            record_of_material(session, principal, "material.epoch_begun", material_id, details)
         queued = _refit_without(session, material_id, principal.key_id) if withdrawn else []
         found = materials.get(session, material)
     return found, len(withdrawn), _follow_up(context, queued)

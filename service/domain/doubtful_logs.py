@@ -23,8 +23,8 @@ def with_doubts(model: "FrictionModel", findings: Sequence[Collection[str]]) -> 
 def with_others_calibrations(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
     """The model with a note among its diagnostics where calibrations by another key than sent them correct logs."""
     by_others = [CORRECTED_BY_ANOTHER in names for names in findings]
-    told = "corrected by a sensor's calibration that another key stored"
-    return _counted(model, OTHERS_CALIBRATIONS, by_others, "is", "are", told)
+    remark = "corrected by a sensor's calibration that another key stored"
+    return _counted(model, OTHERS_CALIBRATIONS, by_others, "is", "are", remark)
 
 
 def with_others_gels(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
@@ -36,23 +36,23 @@ def with_others_gels(model: "FrictionModel", findings: Sequence[Collection[str]]
 def with_reconstructed(model: "FrictionModel", findings: Sequence[Collection[str]]) -> "FrictionModel":
     """The model with a note among its diagnostics where forces of logs are reconstructed."""
     by_displacement = [not BY_DISPLACEMENT.isdisjoint(names) for names in findings]
-    told = "forces reconstructed from displacement, as sure as the description of the sensor's gel"
-    return _counted(model, RECONSTRUCTED_FORCES, by_displacement, "has", "have", told)
+    remark = "forces reconstructed from displacement, as sure as the description of the sensor's gel"
+    return _counted(model, RECONSTRUCTED_FORCES, by_displacement, "has", "have", remark)
 
 
 def with_unchecked(model: "FrictionModel", checked: Sequence[bool]) -> "FrictionModel":
     """The model with a note among its diagnostics where an older version did not look at some logs as this one does."""
-    told = "stored before logs were checked as now: what is sent again is looked at"
-    return _counted(model, UNCHECKED, [not each for each in checked], "was", "were", told)
+    remark = "stored before logs were checked as now: what is sent again is looked at"
+    return _counted(model, UNCHECKED, [not each for each in checked], "was", "were", remark)
 
 
 def _counted(
-    model: "FrictionModel", name: str, logs: Sequence[bool], one: str, several: str, told: str
+    model: "FrictionModel", name: str, logs: Sequence[bool], one: str, several: str, remark: str
 ) -> "FrictionModel":
     """The model with a diagnostic of this name that says of how many of its logs something is so, where of any."""
     count = sum(logs)
     if not count:
         return model
     verb = one if count == 1 else several
-    sentence = f"{count} of {len(logs)} {'log' if len(logs) == 1 else 'logs'} {verb} {told}"
+    sentence = f"{count} of {len(logs)} {'log' if len(logs) == 1 else 'logs'} {verb} {remark}"
     return replace(model, diagnostics={**model.diagnostics, name: sentence})

@@ -25,6 +25,6 @@ def request_fit(
     quotas.check_job(session, settings, principal.key_id)
     quotas.check_change(session, settings, principal.key_id)
     job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
-    told = {"job": job_id, "method": method, "seed": seed}
-    record_of_material(session, principal, "fit.requested", material_id, told)
+    details = {"job": job_id, "method": method, "seed": seed}
+    record_of_material(session, principal, "fit.requested", material_id, details)
     return jobs.get(session, job_id)

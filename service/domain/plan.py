@@ -129,13 +129,13 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
     except stiction_client.InvalidArgument as error:
         raise InvalidValue(error.name, error.value, error.allowed) from error
     low, high = found.feasible_interval
-    told = asdict(found) | {
+    force = asdict(found) | {
         "feasible_interval": (low, finite_or_none(high)),
         "margin": finite_or_none(found.margin),
         "largest_load": finite_or_none(found.largest_load),
         "warning": "; ".join(filter(None, (found.warning, known.disagreement))) or None,
     }
-    return GraspForce(model.material, model.method, model.version, known.because, **told)
+    return GraspForce(model.material, model.method, model.version, known.because, **force)
 
 
 def force_curve(context: Context, task: GraspTask, probabilities: NDArray[np.float64]) -> ForceCurve:
@@ -194,11 +194,11 @@ def recognise(
     seen_by = grasping(sensor or own)
     models = {str(number): to_friction_model(each.model).of_sensor(seen_by) for number, each in enumerate(stored)}
     try:
-        told = estimators.recognise(evidence, models, unknown=unknown)
+        probabilities = estimators.recognise(evidence, models, unknown=unknown)
     except EstimatorError as error:
         raise InvalidSamples(str(error)) from error
-    left = told.pop("unknown")
-    pairs = zip(stored, told.values(), strict=True)
+    left = probabilities.pop("unknown")
+    pairs = zip(stored, probabilities.values(), strict=True)
     candidates = [_candidate(each, probability) for each, probability in pairs]
     return Recognition(tuple(sorted(candidates, key=lambda each: -each.probability)), left)
 

@@ -32,10 +32,10 @@ def recommended(models: Iterable[StoredModel]) -> Recommended | None:
 
 
 def _because(stored: StoredModel) -> str:
-    method, told = stored.model.method, stored.model.diagnostics
+    method, diagnostics = stored.model.method, stored.model.diagnostics
     if method == PREFERENCE[0]:
-        reason = told.get("chosen_because") or "it separates scatter between grasps, between places and within"
-        parts = (reason, told.get("check"), told.get("scatter_prior"))
+        reason = diagnostics.get("chosen_because") or "it separates scatter between grasps, between places and within"
+        parts = (reason, diagnostics.get("check"), diagnostics.get("scatter_prior"))
         return f"{method}: {'; '.join(str(part) for part in parts if part)}"
     return f"{method}: the material has no {PREFERENCE[0]} model yet; ask for a fit by {AUTO}"
 

@@ -235,5 +235,5 @@ def with_copies(model: "FrictionModel", logs: "Sequence[SamplesOfLog]") -> "Fric
     named = [f"{copy} of {counted}" for copy, counted in pairs[:TOLD]]
     more = [f"{len(pairs) - TOLD} more"] if len(pairs) > TOLD else []
     count = "1 log repeats" if len(pairs) == 1 else f"{len(pairs)} logs repeat"
-    told = f"{count} the measurements of another log: counted once ({', '.join([*named, *more])}); {REMEDY}"
-    return replace(model, diagnostics={**model.diagnostics, SAME_GRASPS: told})
+    note = f"{count} the measurements of another log: counted once ({', '.join([*named, *more])}); {REMEDY}"
+    return replace(model, diagnostics={**model.diagnostics, SAME_GRASPS: note})

@@ -243,8 +243,8 @@ def _scales(stored: Scales) -> "estimators.Scales":
     plain = (estimators.Scale(scale.value, _or_infinite(scale.degrees_of_freedom)) for scale in each)
     grasps, places, within = plain
     sensors = stored.between_sensors
-    told = None if sensors is None else estimators.SensorScale.from_json(sensors)
-    return estimators.Scales(grasps, places, within, told)
+    between_sensors = None if sensors is None else estimators.SensorScale.from_json(sensors)
+    return estimators.Scales(grasps, places, within, between_sensors)
 
 
 def _or_infinite(degrees_of_freedom: float | None) -> float:

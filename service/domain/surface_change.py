@@ -29,8 +29,8 @@ def with_change(
         return list(models)
     grasps = [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps]
     alarm = watched(law, grasps, scatter_prior=prior)
-    told: dict[str, float | str] = {MARK: _sentence(alarm)} if alarm.changed else _limits(alarm)
-    return [replace(model, diagnostics={**model.diagnostics, **told}) for model in models] if told else list(models)
+    marks: dict[str, float | str] = {MARK: _sentence(alarm)} if alarm.changed else _limits(alarm)
+    return [replace(model, diagnostics={**model.diagnostics, **marks}) for model in models] if marks else list(models)
 
 
 def _limits(alarm: ChangeAlarm) -> dict[str, float | str]:
@@ -41,11 +41,11 @@ def _limits(alarm: ChangeAlarm) -> dict[str, float | str]:
     fall = noticeable(alarm)
     if grasps < ALARM.settled or fall <= alarm.shift:
         return {NOTICEABLE: fall}
-    told = (
+    note = (
         f"grasps of this material differ so much that a fall of its friction by less than {fall:.0%} is likely to go "
         f"unnoticed for {ALARM.soon} grasps: look at the surface yourself, and record in one way"
     )
-    return {NOTICEABLE: fall, UNNOTICED: told}
+    return {NOTICEABLE: fall, UNNOTICED: note}
 
 
 def _sentence(alarm: ChangeAlarm) -> str:

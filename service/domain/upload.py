@@ -187,7 +187,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
     check_not_ended(session, principal.key_id)
     quotas.lock(session, settings, principal.key_id)
     material_id, sensor = _material(session, settings, received), sensors.as_found(session, received.log.sensor)
-    log, told = replace(received.log, material_id=material_id, sensor=sensor), dict[str, object]()
+    log, details = replace(received.log, material_id=material_id, sensor=sensor), dict[str, object]()
     quotas.check_log(session, settings, principal.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
@@ -211,18 +211,18 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         if is_others:
             quotas.check_change(session, settings, principal.key_id)
             _change_sensor(session, known, material_id, sensor, principal)
-            told = {"sensor": sensor, "sensor_before": known.sensor}
-            record(session, principal, "grasp_log.sensor_changed", log_id, told)
+            details = {"sensor": sensor, "sensor_before": known.sensor}
+            record(session, principal, "grasp_log.sensor_changed", log_id, details)
         if is_outdated:
             grasp_logs.change_sensor(session, log_id, known.sensor)
         if is_others or is_outdated or not _can_go_on(session, known):
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
-        told["calibration_before"] = known.calibration
+        details["calibration_before"] = known.calibration
     stored = grasp_logs.get(session, log_id)
-    told |= {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
-    told["calibration"] = stored.calibration
-    audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
+    details |= {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
+    details["calibration"] = stored.calibration
+    audit.add(session, principal.actor, "grasp_log.uploaded", log_id, details)
     return StoredUpload(stored, is_new)
 
 

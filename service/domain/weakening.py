@@ -47,14 +47,14 @@ def _marked(
         if found is None or found.without - found.friction < INFLUENCE.undone * (expected - friction):
             continue
         log = list(logs)[found.place]
-        told: dict[str, float | str] = {
+        marks: dict[str, float | str] = {
             LOG: log,
             EFFECT: found.effect,
             BEFORE: expected,
             WEAKENING: _sentence(log, found, at, expected, sensor),
         }
         of_it = {} if sensor is None else {SENSOR: sensor}
-        return replace(model, diagnostics={**model.diagnostics, **told, **of_it})
+        return replace(model, diagnostics={**model.diagnostics, **marks, **of_it})
     return model
 
 
@@ -75,13 +75,13 @@ def _expected(
 
     Of a sensor that the model before did not know there is nothing to compare with: 0.
     """
-    told, known = before.diagnostics, None if earlier.scales is None else earlier.scales.between_sensors
+    diagnostics, known = before.diagnostics, None if earlier.scales is None else earlier.scales.between_sensors
     if sensor is not None and (known is None or sensor not in known.sensors):
         return 0.0
     force = at.normal_force * earlier.element_area / model.element_area
     expected = counted_on(earlier, replace(at, normal_force=force), sensor)
-    if told.get(LOG) in logs and told.get(SENSOR) == sensor and not _falls(model, at, sensor, expected):
-        return float(told.get(BEFORE) or 0.0)
+    if diagnostics.get(LOG) in logs and diagnostics.get(SENSOR) == sensor and not _falls(model, at, sensor, expected):
+        return float(diagnostics.get(BEFORE) or 0.0)
     return expected
 
 

@@ -61,16 +61,16 @@ def _check_alike(recordings: Sequence[DetectedLog]) -> None:
         if list(_features(log)) != present:
             raise InvalidInput(recording.name, "with other members than the first log", f"those: {', '.join(present)}")
         if log.gripper_force_deviation != first.gripper_force_deviation:
-            told = f"of a gripper's force known to {log.gripper_force_deviation} N"
-            raise InvalidInput(recording.name, told, f"as the first log's, {first.gripper_force_deviation} N")
+            deviation = f"of a gripper's force known to {log.gripper_force_deviation} N"
+            raise InvalidInput(recording.name, deviation, f"as the first log's, {first.gripper_force_deviation} N")
         if not np.array_equal(log.position, first.position):
             raise InvalidInput(recording.name, "of a sensor with other markers", "logs of one sensor in a data set")
 
 
 def _features(log: GraspLog) -> Columns:
     """The features that the log has, by name."""
-    told = {name: getattr(log, name) for name in FEATURES if name != "displacement" or log.has_displacement}
-    return {name: values for name, values in told.items() if values is not None}
+    features = {name: getattr(log, name) for name in FEATURES if name != "displacement" or log.has_displacement}
+    return {name: values for name, values in features.items() if values is not None}
 
 
 def _frame_rate(recordings: Sequence[DetectedLog]) -> int:
@@ -130,10 +130,10 @@ def _episodes(recordings: Sequence[DetectedLog], columns: Columns, lengths: Sequ
 
 def _statistics_of_each(episodes: Sequence[Columns]) -> Columns:
     """A column of each statistic of each feature, as LeRobot's own writer has them."""
-    told = [{name: _statistics(column) for name, column in columns.items()} for columns in episodes]
+    statistics_of_each = [{name: _statistics(column) for name, column in columns.items()} for columns in episodes]
     return {
-        f"stats/{name}/{statistic}": np.array([each[name][statistic] for each in told])
-        for name, statistics in told[0].items()
+        f"stats/{name}/{statistic}": np.array([each[name][statistic] for each in statistics_of_each])
+        for name, statistics in statistics_of_each[0].items()
         for statistic in statistics
     }
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from service.formats import height_maps, rest
 from service.formats.lattice import element_area, flat_lattice
 from service.formats.mapping import COMPONENTS, PRESSURE_ALONE, FieldMapping, Origin
-from service.formats.members import DTYPES, FLAG, FLOAT, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
+from service.formats.members import DTYPES, FLAG, FLOAT, ONCE, REQUIRED, TEXT, Members, grasp_log, stated_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
@@ -152,8 +152,8 @@ def _from_heights(
         raise InvalidInput("displacement", f"of shape {list(moved.shape)}", f"{[*shape, 3]} beside height, with no z")
     moved[..., 2] = risen.reshape(shape)
     members["displacement"] = moved
-    told = members.get("observed", np.ones(shape, dtype=bool))
-    members["observed"] = check_mask("observed", told, shape) & seen.reshape(shape)
+    observed = members.get("observed", np.ones(shape, dtype=bool))
+    members["observed"] = check_mask("observed", observed, shape) & seen.reshape(shape)
     members.setdefault("position", elements.position)
     members.setdefault("element_area", np.array(elements.area))
     metadata["rest"] = f"frame {frame}"
@@ -165,8 +165,8 @@ def _elements_of(
     """Squares about the markers at rest, or all of a map of so many pixels, a ``pixel`` m wide."""
     if "position" in members:
         position = check_position(members["position"])
-        told = members.get("element_area")
-        area = element_area("position", position) if told is None else check_element_area(told)
+        stated = members.get("element_area")
+        area = element_area("position", position) if stated is None else check_element_area(stated)
         return height_maps.Elements(position, (math.sqrt(area),) * 2)
     if grid is None:
         raise InvalidInput("grid", "not there", "the number of elements into which height is divided")
@@ -196,8 +196,8 @@ def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata
 
 def _observed(members: Members, moved: FloatArray, places: bool) -> BoolArray:
     """Which elements ``moved`` [t, n, m, c] are seen [t, n, m]; one that never is has no place."""
-    told = members.get("observed")
-    seen = np.ones(moved.shape[:-1], bool) if told is None else check_mask("observed", told, moved.shape[:-1])
+    observed = members.get("observed")
+    seen = np.ones(moved.shape[:-1], bool) if observed is None else check_mask("observed", observed, moved.shape[:-1])
     if places and not seen.any(axis=0).all():
         element = np.argwhere(~seen.any(axis=0))[0].tolist()
         raise InvalidInput("position", f"of element {element} observed in no frame", "a place of each element")
@@ -365,4 +365,4 @@ def _likely_grid(name: str, array: NDArray[Any]) -> str:
 
 def _with(members: Members, metadata: dict[str, str]) -> NDArray[Any]:
     """The file's metadata with what the reader has to say."""
-    return np.array(json.dumps({**told_metadata(members), **metadata}))
+    return np.array(json.dumps({**stated_metadata(members), **metadata}))

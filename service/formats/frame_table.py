@@ -118,17 +118,17 @@ class _Table:
 
     def notes(self) -> dict[str, str]:
         """What the columns to be noted hold: how often each of a few numbers, or the median of many."""
-        told = {}
+        notes = {}
         for name, field in self.mapping.notes.items():
             found = self._values[:, [self._place[column] for column in self._columns(field)]]
             numbers, times = np.unique(found[np.isfinite(found)], return_counts=True)
             if 0 < len(numbers) <= MOST_STATES:
-                told[name] = ", ".join(
+                notes[name] = ", ".join(
                     f"{number:g} {count} times" for number, count in zip(numbers, times, strict=True)
                 )
             elif len(numbers):
-                told[name] = f"median {np.nanmedian(found):.4g} of {int(times.sum())}"
-        return told
+                notes[name] = f"median {np.nanmedian(found):.4g} of {int(times.sum())}"
+        return notes
 
     def contents(self) -> str:
         """The columns."""

@@ -70,16 +70,16 @@ def _info(folder: Path) -> dict[str, Any]:
         info = parse_object(LEROBOT_INFO, (folder / LEROBOT_INFO).read_text(encoding="utf-8"))
         version, features = str(info["codebase_version"]), info["features"]
         {name: feature["shape"] for name, feature in features.items()}
-        told = {"features": features, "data_path": str(info["data_path"])}
+        needed = {"features": features, "data_path": str(info["data_path"])}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         value = f"damaged ({type(error).__name__}: {str(error)[:80]})"
         raise InvalidInput(LEROBOT_INFO, value, "the description that LeRobot writes") from error
     if not version.startswith(VERSION):
         raise InvalidInput("codebase_version", version[:20], f"v3.0; python -m {CONVERTER} brings older ones to it")
-    if not DATA_PATH.fullmatch(told["data_path"]):
+    if not DATA_PATH.fullmatch(needed["data_path"]):
         allowed = "a path with {chunk_index:03d} and {file_index:03d}"
-        raise InvalidInput("data_path", repr(told["data_path"])[:60], allowed)
-    return told
+        raise InvalidInput("data_path", repr(needed["data_path"])[:60], allowed)
+    return needed
 
 
 def _check_features(features: dict[str, Any], mapping: FieldMapping) -> None:

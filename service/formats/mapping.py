@@ -143,16 +143,17 @@ def parse(text: str) -> FieldMapping:
     return replace(first, alternatives=tuple(others))
 
 
-def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
-    """The mapping that is ``given``, where another may have been ``told``, such as a preset."""
+def _parsed(given: Mapping[str, Any], original: Mapping[str, Any]) -> FieldMapping:
+    """The mapping that is ``given``, which may have been made of an ``original`` that names a preset."""
     unknown = sorted(given.keys() - {*MAPPED, *_SETTINGS})
     if "pressure" in unknown:
         raise InvalidInput("pressure", "mapped", PRESSURE_ALONE)
     if unknown:
         raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*MAPPED, *_SETTINGS)))
     topic = _text("topic", given["topic"]) if "topic" in given else None
+    origins = {name: _origin(name, given[name], topic) for name in MAPPED if name in given}
     return FieldMapping(
-        origins={name: _required(name, told, _origin(name, given[name], topic)) for name in MAPPED if name in given},
+        origins={name: _required(name, original, origin) for name, origin in origins.items()},
         grid=_grid("grid", given["grid"], "markers") if "grid" in given else None,
         pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
         pixel=_pixel(given["pixel"]) if "pixel" in given else None,
@@ -161,15 +162,15 @@ def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
         episode=_episode(given["episode"]) if "episode" in given else None,
         element=_text("element", given["element"]) if "element" in given else None,
         rest=rests.check(str(given["rest"])) if "rest" in given else None,
-        text=json.dumps(told, sort_keys=True, ensure_ascii=False),
+        text=json.dumps(original, sort_keys=True, ensure_ascii=False),
         notes=_notes(given["notes"]) if "notes" in given else {},
-        preset="preset" in told,
+        preset="preset" in original,
     )
 
 
-def _required(name: str, told: Mapping[str, Any], origin: Origin) -> Origin:
+def _required(name: str, original: Mapping[str, Any], origin: Origin) -> Origin:
     """An origin that must be there, unless a preset alone names the contact: not all firmware reports it."""
-    return replace(origin, explicit=name != "contact" or "preset" not in told or name in told)
+    return replace(origin, explicit=name != "contact" or "preset" not in original or name in original)
 
 
 def _notes(given: Any) -> dict[str, str]:

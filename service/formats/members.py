@@ -65,7 +65,7 @@ def grasp_log(members: Members) -> GraspLog:
         normal=members.get("normal"),
         object_pose=members.get("object_pose"),
         sensor=_scalar_or(members, "sensor", UNNAMED),
-        metadata=told_metadata(members),
+        metadata=stated_metadata(members),
         truth=_truth(members),
         contact=members.get("contact"),
         observed=members.get("observed"),
@@ -92,7 +92,7 @@ def _scalar_or(members: Members, name: str, otherwise: Any) -> Any:
     return scalar(members, name) if name in members else otherwise
 
 
-def told_metadata(members: Members) -> dict[str, str]:
+def stated_metadata(members: Members) -> dict[str, str]:
     """The entries of the metadata, none where there are no metadata."""
     text = _scalar_or(members, "metadata", "{}")
     allowed = "a JSON object of strings"

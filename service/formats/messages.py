@@ -90,10 +90,10 @@ class MessageColumns:
 
     def grid(self) -> tuple[int, int] | None:
         """As Stiction's own topic of the log gives it."""
-        told = self._values.get((LOG_TOPIC, "grid"))
-        if told is None or told[0].shape != (2,) or told[0].dtype.kind not in "iu":
+        values = self._values.get((LOG_TOPIC, "grid"))
+        if values is None or values[0].shape != (2,) or values[0].dtype.kind not in "iu":
             return None
-        return int(told[0][0]), int(told[0][1])
+        return int(values[0][0]), int(values[0][1])
 
     def contents(self) -> str:
         """The topics."""

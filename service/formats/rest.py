@@ -88,8 +88,8 @@ def load_of(members: Members) -> FloatArray | None:
     """How much touches in each frame [t]: elements in contact, or force, or the gripper's; None where none is known."""
     for name in ("contact", "force", "gripper_force"):
         if name in members and np.ndim(members[name]):  # one number for all frames says nothing of rest
-            told = np.abs(np.asarray(members[name], dtype=np.float64))
-            return np.asarray(np.nan_to_num(told).reshape(len(told), -1).sum(axis=1))
+            load = np.abs(np.asarray(members[name], dtype=np.float64))
+            return np.asarray(np.nan_to_num(load).reshape(len(load), -1).sum(axis=1))
     return None
 
 

@@ -192,7 +192,7 @@ def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -
     if header.columns.keys() >= set(FORCE):
         force = np.full(place.shape, np.nan)
         force[frame, marker] = table[:, 7:10]
-        force = _last_told(force)
+        force = _last_stated(force)
     return Tracks(tuple(names), time, place, force, contact, "z" in header.columns, gripper_force)
 
 
@@ -259,16 +259,16 @@ def _check_once(
         raise InvalidInput(f"line {lines[row]:.0f}", f"marker {name[:40]!r} again in one frame", "each marker once")
 
 
-def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -> FloatArray:
+def _one_a_frame(frame: NDArray[np.intp], column: FloatArray, lines: FloatArray) -> FloatArray:
     """What the rows of each frame state alike, or one of them states [t]; raises ``InvalidInput`` where none does."""
     values = np.full(int(frame.max()) + 1, np.nan)
-    rows_telling = np.flatnonzero(np.isfinite(told))
-    values[frame[rows_telling[::-1]]] = told[rows_telling[::-1]]
-    other = rows_telling[told[rows_telling] != values[frame[rows_telling]]]
+    rows_stating = np.flatnonzero(np.isfinite(column))
+    values[frame[rows_stating[::-1]]] = column[rows_stating[::-1]]
+    other = rows_stating[column[rows_stating] != values[frame[rows_stating]]]
     if other.size:
         place = f"line {lines[other[0]]:.0f}, gripper_force"
         raise InvalidInput(
-            place, f"{told[other[0]]:g} N", f"{values[frame[other[0]]]:g} N, as in the frame's other rows"
+            place, f"{column[other[0]]:g} N", f"{values[frame[other[0]]]:g} N, as in the frame's other rows"
         )
     unknown = np.flatnonzero(np.isnan(values))
     if unknown.size:
@@ -278,17 +278,17 @@ def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -
 
 def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Contact [t, k]; where it isn't given, as it was given last, at first none."""
-    told = np.full((*shape, 1), np.nan)
-    told[frame, marker, 0] = touching
-    held: BoolArray = _last_told(told)[..., 0] == 1.0
+    stated = np.full((*shape, 1), np.nan)
+    stated[frame, marker, 0] = touching
+    held: BoolArray = _last_stated(stated)[..., 0] == 1.0
     return held
 
 
-def _last_told(told: FloatArray) -> FloatArray:
+def _last_stated(stated: FloatArray) -> FloatArray:
     """Numbers [t, k, c] as they were given last, at first 0."""
-    frames = np.arange(len(told))[:, None, None]
-    last = np.maximum.accumulate(np.where(np.isnan(told), 0, frames), axis=0)
-    return np.nan_to_num(np.take_along_axis(told, last, axis=0), nan=0.0)
+    frames = np.arange(len(stated))[:, None, None]
+    last = np.maximum.accumulate(np.where(np.isnan(stated), 0, frames), axis=0)
+    return np.nan_to_num(np.take_along_axis(stated, last, axis=0), nan=0.0)
 
 
 def _grasp_log(
@@ -338,8 +338,8 @@ def _rest(tracks: Tracks, chosen: str, places: Mapping[str, FloatArray] | None) 
     if places is not None:
         unknown = np.full(3, np.nan)
         return np.array([places.get(name, unknown) for name in tracks.names]), "file of rest"
-    told = {"contact": tracks.contact, "force": tracks.force, "gripper_force": tracks.gripper_force}
-    load = rests.load_of({name: value for name, value in told.items() if value is not None})
+    members = {"contact": tracks.contact, "force": tracks.force, "gripper_force": tracks.gripper_force}
+    load = rests.load_of({name: value for name, value in members.items() if value is not None})
     frame = rests.frame_of(chosen, len(tracks.time), load, tracks.place)
     return tracks.place[frame], f"frame {frame}" if frame else "first frame"
 
@@ -354,12 +354,12 @@ def _with_gripper(log: GraspLog, force: FloatArray | None, settings: Mapping[str
 
 def _metadata(tracks: Tracks, known: BoolArray, ignored: tuple[str, ...], where: str) -> dict[str, Any]:
     lost = int(np.isnan(tracks.place[:, known, 0] + tracks.place[:, known, 1]).sum())
-    told = {"format": "tracked markers", "markers": str(int(known.sum())), "lost_places": str(lost)}
+    metadata = {"format": "tracked markers", "markers": str(int(known.sum())), "lost_places": str(lost)}
     left_out = int(len(known) - known.sum())
     if left_out:
-        told["markers_left_out"] = f"{left_out} (not in the {where})"
+        metadata["markers_left_out"] = f"{left_out} (not in the {where})"
     if where != "first frame":
-        told["rest"] = where
+        metadata["rest"] = where
     if ignored:
-        told["columns_left_out"] = ", ".join(ignored)[:200]
-    return told
+        metadata["columns_left_out"] = ", ".join(ignored)[:200]
+    return metadata

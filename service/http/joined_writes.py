@@ -94,7 +94,7 @@ class JoinedWrites:
 def _unacknowledged(transport: asyncio.Transport) -> int:
     """Bytes that the system has taken and the client's has not: of a slow reader megabytes, for minutes."""
     try:
-        told = fcntl.ioctl(transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, bytes(4))
+        count = fcntl.ioctl(transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, bytes(4))
     except (AttributeError, OSError, ValueError):  # no socket, or a system that does not say
         return 0
-    return int(struct.unpack("i", told)[0])
+    return int(struct.unpack("i", count)[0])

@@ -28,8 +28,8 @@ def wrong_parameter(given: Collection[tuple[str, str]], known: Mapping[str, bool
     """
     for name, times in Counter(name for name, _ in given).items():
         if name not in known:
-            told = shown(name)[:LONGEST_SHOWN] or "a parameter without a name"
-            return Problem.wrong_value(INVALID_REQUEST, told, "unknown", ", ".join(known) or "no parameters")
+            label = shown(name)[:LONGEST_SHOWN] or "a parameter without a name"
+            return Problem.wrong_value(INVALID_REQUEST, label, "unknown", ", ".join(known) or "no parameters")
         if times > 1:
             return Problem.wrong_value(INVALID_REQUEST, name, f"given {times} times", "once")
     for name, value in given:

@@ -383,6 +383,6 @@ def _note_change(run: Run, session: Session, material_id: int, model: FrictionMo
         return
     before = friction_models.all_current(session, [material_id]).get(material_id, [])
     if not any(MARK in stored.model.diagnostics for stored in before):
-        told = {"change": model.diagnostics[MARK], "grasp_log": run.job.grasp_log_id}
+        details = {"change": model.diagnostics[MARK], "grasp_log": run.job.grasp_log_id}
         name = jobs.get(session, run.job.id).material
-        audit.add(session, audit.SERVICE, "material.surface_changed", str(name), told)
+        audit.add(session, audit.SERVICE, "material.surface_changed", str(name), details)

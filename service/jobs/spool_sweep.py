@@ -17,8 +17,8 @@ LOOK_SECONDS = 60.0
 """Between two looks into the folder, s."""
 
 FILE_SECONDS, FOLDER_SECONDS = 3600.0, 86400.0
-"""Age, s, from which a file that no process holds, and a folder, are removed. Processes lock a file as they create it, but
-no folder: one belongs to a reader, which has four hours at most.
+"""Age, s, from which a file that no process holds, and a folder, are removed. Processes lock a file as they create it,
+but no folder: that is a reader's, which has four hours at most.
 """
 
 

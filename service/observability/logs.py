@@ -105,9 +105,9 @@ class TextLines(logging.Formatter):
         """The record as text."""
         message = _safe(record.getMessage()).replace("\r", "\\r").replace("\n", "\\n")  # a line is not to be forged
         fields = {**ABOUT.get(), **getattr(record, "about", {})}
-        told = "".join(f" {name}={value}" for name, value in fields.items())
+        extra = "".join(f" {name}={value}" for name, value in fields.items())
         trace = _trace(self, record)
-        line = f"{_moment(record)} {record.levelname} {record.name}: {message}{told}"
+        line = f"{_moment(record)} {record.levelname} {record.name}: {message}{extra}"
         return f"{line}\n{trace}" if trace else line
 
 

@@ -40,9 +40,9 @@ def span(name: str, parent: str | None = None, **attributes: str) -> AbstractCon
     from opentelemetry.propagate import extract
 
     context = None if parent is None else extract({"traceparent": parent})
-    told = {f"stiction.{key}": value for key, value in attributes.items()}
+    named = {f"stiction.{key}": value for key, value in attributes.items()}
     tracer = _provider.get_tracer("stiction")
-    return tracer.start_as_current_span(name, context, attributes=told, record_exception=False)
+    return tracer.start_as_current_span(name, context, attributes=named, record_exception=False)
 
 
 def place() -> str | None:

@@ -58,8 +58,8 @@ def _steps(seen: InspectedGrasp) -> list[str]:
         return [*steps, "Record another grasp of the same material, or load this one further, until parts of it slip."]
     if any(severity_of(finding.name) == "warning" for finding in found):
         return [*steps, "Record the grasp again once that is mended."]
-    told = next_grasp(seen.model, WorkingPoint(0.5 * sum(seen.model.domain.normal_force)), grasps=1)
-    return [*steps, wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]
+    probe = next_grasp(seen.model, WorkingPoint(0.5 * sum(seen.model.domain.normal_force)), grasps=1)
+    return [*steps, wording.record_next(probe), "Upload it with others of its material, and ask how hard to grip that."]
 
 
 def _seen_facts(seen: InspectedGrasp) -> list[Fact]:

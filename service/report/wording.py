@@ -55,12 +55,12 @@ class Probe(Protocol):
         """The same with this grasp."""
 
 
-def record_next(told: Probe) -> str:
+def record_next(probe: Probe) -> str:
     """What to record next, and what that is good for."""
     return (
-        f"Record next: press with {number(told.normal_force)} N on an element and let it slip by "
-        f"{number(told.slip_length * 1e3)} mm at {number(told.speed * 1e3)} mm/s. The expected friction, known to "
-        f"± {number(told.uncertainty)}, is then known to ± {number(told.after)}."
+        f"Record next: press with {number(probe.normal_force)} N on an element and let it slip by "
+        f"{number(probe.slip_length * 1e3)} mm at {number(probe.speed * 1e3)} mm/s. The expected friction, known to "
+        f"± {number(probe.uncertainty)}, is then known to ± {number(probe.after)}."
     )
 
 
@@ -79,14 +79,14 @@ def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
     """Coefficients and σ of each model with 95 % intervals; which velocities are unknown, what came from others."""
     rows = [[name, *estimates(model), str(model.n)] for name, model in models.items()]
     remarks = ("unknown_velocity", "scatter_prior")
-    told = {str(model.diagnostics.get(name) or "") for model in models.values() for name in remarks} - {""}
-    told |= {note for model in models.values() for note in model.notes}
-    caption = "; ".join(["Estimates and 95 % intervals", *sorted(told)])
+    notes = {str(model.diagnostics.get(name) or "") for model in models.values() for name in remarks} - {""}
+    notes |= {note for model in models.values() for note in model.notes}
+    caption = "; ".join(["Estimates and 95 % intervals", *sorted(notes)])
     return Table(caption, ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
 
 
 def estimates(model: LinearFriction) -> list[str]:
     """Each coefficient and σ with its 95 % interval."""
     bounds = zip(model.coefficients, model.interval(0.95), model.identifiable, strict=True)
-    cells = [f"{number(value)} ({interval(ends)}){'' if told else ' †'}" for value, ends, told in bounds]
+    cells = [f"{number(value)} ({interval(ends)}){'' if known else ' †'}" for value, ends, known in bounds]
     return [*cells, f"{number(model.scale)} ({interval(model.scale_interval(0.95))})"]

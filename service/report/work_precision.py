@@ -147,8 +147,8 @@ def _of_models(name: str, models: "Mapping[str, tuple[LinearFriction, float]]", 
         error = math.nan if ask == reference else abs(mean - exact[0]) + abs(half - exact[1])  # of the farther end
         compared = f"; {COMPARED}" if ask == reference else ""
         found.append(Setting(ask, seconds, error / exact[1], f"μ = {mean:.4f} ± {half:.4f}{compared}"))
-    told = reference.removeprefix("--method ")
-    return WorkPrecision(name, f"an end of the 95 % interval of μ against that by {told}, in half-widths", tuple(found))
+    measure = f"an end of the 95 % interval of μ against that by {reference.removeprefix('--method ')}, in half-widths"
+    return WorkPrecision(name, measure, tuple(found))
 
 
 def _friction(model: "LinearFriction") -> tuple[float, float]:

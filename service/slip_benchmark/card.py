@@ -43,7 +43,7 @@ def data_card(manifest: Manifest) -> str:
     kinds = Counter(scene.kind for scene in manifest.scenes)
     faults = Counter(scene.fault for scene in manifest.scenes)
     rows = [_row(KINDS[name], count) for name, count in sorted(kinds.items())]
-    told = dict.fromkeys(fault.name for name in manifest.kinds for fault in faults_of(KINDS[name]))
+    present = dict.fromkeys(fault.name for name in manifest.kinds for fault in faults_of(KINDS[name]))
     return _TEXT.format(
         count=len(manifest.scenes),
         format=FORMAT,
@@ -52,7 +52,7 @@ def data_card(manifest: Manifest) -> str:
         licence=manifest.licence,
         seal=manifest.seal,
         kinds="\n".join(rows),
-        faults=", ".join(f"{name} ({faults[name]})" for name in told),
+        faults=", ".join(f"{name} ({faults[name]})" for name in present),
     )
 
 

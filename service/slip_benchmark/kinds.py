@@ -61,13 +61,13 @@ class SensorFault:
 
     def seen(self, kind: Kind, log: GraspLog, rng: np.random.Generator) -> GraspLog:
         """The log as such a sensor reports it: nothing of the object, and no truth but beside it."""
-        told = self.put_in(replace(log, normal=None, object_pose=None), rng)
-        told = MarkerNoise(self.marker_noise).observe(told, rng)
+        reported = self.put_in(replace(log, normal=None, object_pose=None), rng)
+        reported = MarkerNoise(self.marker_noise).observe(reported, rng)
         if kind.force_noise is None:
-            told = replace(told, force=None)
+            reported = replace(reported, force=None)
         elif self.marker_noise:
-            told = ForceNoise(kind.force_noise).observe(told, rng)
-        return in_plane(told) if kind.in_plane else told
+            reported = ForceNoise(kind.force_noise).observe(reported, rng)
+        return in_plane(reported) if kind.in_plane else reported
 
 
 def in_plane(log: GraspLog) -> GraspLog:

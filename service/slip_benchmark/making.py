@@ -49,8 +49,8 @@ def _begun(phrase: str, kinds: tuple[Kind, ...], folder: Path) -> Manifest:
     known = files.read_manifest(folder)
     if replace(known, scenes=()) != manifest:
         made = f"made by {known.made_by} of {'this' if known.seal == manifest.seal else 'another'} phrase"
-        told = f"{folder}, {made} for kinds {', '.join(known.kinds)}"
-        raise InvalidInput("folder", told, "one of the same phrase, kinds and version, or a new one")
+        description = f"{folder}, {made} for kinds {', '.join(known.kinds)}"
+        raise InvalidInput("folder", description, "one of the same phrase, kinds and version, or a new one")
     return known
 
 

@@ -86,8 +86,8 @@ class Program:
                     self.name, f"not done after {self.limit:g} s", "faster, or a longer --limit"
                 ) from error
         if running.returncode != 0:
-            told = output.decode(errors="replace").strip()[-MOST_OUTPUT:] or "nothing"
-            raise InvalidInput(self.name, f"ended by code {running.returncode}; it said: {told}", "code 0")
+            shown = output.decode(errors="replace").strip()[-MOST_OUTPUT:] or "nothing"
+            raise InvalidInput(self.name, f"ended by code {running.returncode}; it said: {shown}", "code 0")
 
 
 def run(executor: Executor, folder: Path, detectors: Sequence[str], program: Program | None) -> Iterator[PredictionRun]:
@@ -141,8 +141,8 @@ def _detect(method: str, seen: Path, prediction: Path) -> None:
     if log.force is None and method in NEEDS_FORCES:
         raise InvalidInput("force", "missing", f"a sensor with forces, for detector {method}")
     history = detect_slip(log, method)
-    told = {"slip": history.slip, "probability": history.probability, "macro_slip": history.macro_slip}
-    files.write_arrays(prediction, told | _friction(log, history))
+    members = {"slip": history.slip, "probability": history.probability, "macro_slip": history.macro_slip}
+    files.write_arrays(prediction, members | _friction(log, history))
 
 
 def _friction(log: GraspLog, history: SlipHistory) -> dict[str, NDArray[Any]]:

@@ -76,9 +76,9 @@ def _contact(control: Control) -> Contact:
     if control.torque_arm == 0.0:
         own = f"{contact.torque_arm:g} m, which this contact has without it"
         raise InvalidArgument("torque_arm", 0.0, f"above 0 m, for frames have torques, such as {own}")
-    told = {
+    given = {
         name: float(within(name, value, low, high, unit))
         for name, (low, high, unit) in CONTACT_RANGES.items()
         if (value := getattr(control, name)) is not None
     }
-    return replace(contact, **told)
+    return replace(contact, **given)

@@ -109,7 +109,7 @@ class Reconstructing:
         self.alike = forces.alike
         self.noise, self.deviation = forces.force_noise or self.noise, found.force_deviation
         findings = [*at_end_of_range(found.saturated), *contradicted(self.stream.contradicted)]
-        told = {
+        report = {
             "source": "reconstructed",
             "resultant": forces.resultant.tolist(),
             "deviation": forces.resultant_deviation.tolist(),
@@ -122,7 +122,7 @@ class Reconstructing:
             "findings": [asdict(finding) for finding in findings],
         }
         normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
-        return frame._replace(force=forces.force, normal=normal, contact=found.contact), told
+        return frame._replace(force=forces.force, normal=normal, contact=found.contact), report
 
     def _without_look(
         self, frame: Frame, gripper_force: float | None, deviation: float | None

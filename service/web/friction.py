@@ -113,8 +113,8 @@ def coefficients(stored: StoredModel) -> list[Coefficient]:
     model = to_friction_model(stored.model)
     numbers = zip(model.coefficients.tolist(), model.interval(0.95).tolist(), model.identifiable.tolist(), strict=True)
     return [
-        Coefficient(*words, value, (low, high), told)
-        for words, (value, (low, high), told) in zip(COEFFICIENTS, numbers, strict=True)
+        Coefficient(*words, value, (low, high), identifiable)
+        for words, (value, (low, high), identifiable) in zip(COEFFICIENTS, numbers, strict=True)
     ]
 
 

@@ -152,8 +152,8 @@ class FrictionModelOut(BaseModel):
     def of(cls, stored: StoredModel) -> "FrictionModelOut":
         """The stored model as an answer, with what it rests on at rest and in the middle of its normal forces."""
         model = to_client_model(stored)
-        told = {"support": model.support, "advice": model.advice, "notes": list(model.notes)}
-        return cls.model_validate(model.to_json() | told)
+        derived = {"support": model.support, "advice": model.advice, "notes": list(model.notes)}
+        return cls.model_validate(model.to_json() | derived)
 
 
 class FrictionModelsOut(BaseModel):

@@ -167,6 +167,6 @@ def _report_of(context: Context, name: str) -> partial[None]:
         logs = grasp_logs.list_all(session, newest, LogFilter(material_id=found.id))
     stored = usual_model(found.models)
     probe = None if stored is None else next_of(stored, friction_at(stored, None))
-    told = [GraspLogReceipt.from_json(GraspLogOut.of(log).model_dump(mode="json")) for log in logs]
+    receipts = [GraspLogReceipt.from_json(GraspLogOut.of(log).model_dump(mode="json")) for log in logs]
     material = Material.from_json(MaterialOut.of(found).model_dump(mode="json"))
-    return partial(reports.write_material, material, told, probe)
+    return partial(reports.write_material, material, receipts, probe)

@@ -67,11 +67,11 @@ def describe_sensor(
     fields = dict(zip(FIELDS, (young_modulus, poisson_ratio, thickness, marker_depth), strict=True))
     sensor = sensors.find(context, name)
     on_problem(request, "sensor.html", **_shown(context, request, sensor, None), fields=fields)
-    told = checked(GelIn, {each: text.strip() for each, text in fields.items()})
+    described = checked(GelIn, {each: text.strip() for each, text in fields.items()})
     if sensor.gel is not None and sensor.gel.relative_thickness is not None:
         rows = [list(row) for row in sensor.gel.relative_thickness]
-        told = revised(GelIn, told.model_dump() | {"relative_thickness": rows})
-    sensors.describe(context, name, told.record(), principal)
+        described = revised(GelIn, described.model_dump() | {"relative_thickness": rows})
+    sensors.describe(context, name, described.record(), principal)
     return RedirectResponse(f"/sensors/{quote(name, safe='')}", 303)
 
 

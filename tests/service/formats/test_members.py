@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.formats.members import TRUTH, grasp_log, of_all_frames, scalar, told_metadata
+from service.formats.members import TRUTH, grasp_log, of_all_frames, scalar, stated_metadata
 from slipcore import InvalidInput
 from slipcore.frames import UNNAMED
 
@@ -89,15 +89,15 @@ def test_text_that_cannot_be_stored_is_refused() -> None:
 @pytest.mark.parametrize("text", ["[]", '"a"', '{"a": 1}', '{"a": null}', '{"a": {}}', "{"])
 def test_metadata_are_an_object_of_strings(text: str) -> None:
     with pytest.raises(InvalidInput, match=r"metadata is .*; allowed: a JSON object of strings"):
-        told_metadata({"metadata": np.array(text)})
+        stated_metadata({"metadata": np.array(text)})
     with pytest.raises(InvalidInput) as refusal:
-        told_metadata({"metadata": np.array(json.dumps(["x" * 200]))})
+        stated_metadata({"metadata": np.array(json.dumps(["x" * 200]))})
     assert len(refusal.value.value) == 100
 
 
 def test_without_metadata_there_are_none() -> None:
-    assert told_metadata({}) == {}
-    assert told_metadata({"metadata": np.array('{"a": "1", "μ": "é"}')}) == {"a": "1", "μ": "é"}
+    assert stated_metadata({}) == {}
+    assert stated_metadata({"metadata": np.array('{"a": "1", "μ": "é"}')}) == {"a": "1", "μ": "é"}
 
 
 def test_what_all_frames_state_alike_is_the_log_s() -> None:
