@@ -86,7 +86,7 @@ def run(
     scenes: Sequence[Scene],
     seeds: Sequence[int],
     folder: Path,
-    promise: RequestedAccuracy,
+    accuracy: RequestedAccuracy,
     written_as: str = "npz",
 ) -> Iterator[Outcome]:
     """Simulate each scene with each seed that the folder lacks; what is there comes first, the others as they are made.
@@ -94,7 +94,7 @@ def run(
     Logs are ``written_as`` one of ``FORMATS``. Raises ``InvalidInput`` for two scenes of one name, and for a folder
     that holds another campaign.
     """
-    _write_plan(folder, scenes, promise, written_as)
+    _write_plan(folder, scenes, accuracy, written_as)
     under_way: dict[Future[GraspLog], Outcome] = {}
     for scene in scenes:
         for seed in seeds:
@@ -102,7 +102,7 @@ def run(
             if outcome.path.exists():
                 yield outcome
             else:
-                under_way[executor.submit(simulate, scene, seed=seed, **asdict(promise))] = outcome
+                under_way[executor.submit(simulate, scene, seed=seed, **asdict(accuracy))] = outcome
     for done in as_completed(list(under_way)):
         yield _kept(done, under_way.pop(done), written_as)
 
@@ -127,7 +127,7 @@ def _kept(done: Future[GraspLog], outcome: Outcome, written_as: str) -> Outcome:
     return outcome
 
 
-def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccuracy, written_as: str) -> None:
+def _write_plan(folder: Path, scenes: Sequence[Scene], accuracy: RequestedAccuracy, written_as: str) -> None:
     """Write down what the folder holds; more scenes may come to it, but none may change."""
     if written_as not in FORMATS:
         raise InvalidInput("format", written_as, " or ".join(FORMATS))
@@ -136,7 +136,7 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccurac
         if names.count(name) > 1:
             raise InvalidInput("scenes", f"{name!r} twice", "scenes of different names")
     folder.mkdir(parents=True, exist_ok=True)
-    path, asked = folder / PLAN, asdict(promise)
+    path, asked = folder / PLAN, asdict(accuracy)
     new: dict[str, Any] = {"scenes": {}, "promise": asked, "format": written_as}
     known = _read_plan(path) if path.exists() else new
     if known["format"] != written_as:
@@ -165,5 +165,5 @@ def _file_name(scene: Scene) -> str:
     return re.sub(r"\W+", "_", scene.name.strip().lower()) or "scene"
 
 
-def _plan_text(promise: Mapping[str, object]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in promise.items() if value is not None) or "no accuracy"
+def _plan_text(accuracy: Mapping[str, object]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in accuracy.items() if value is not None) or "no accuracy"

@@ -171,7 +171,7 @@ STATED = {
         f"a rest shape that changes by more than {1e3 * tac3d.REST_TOLERANCE:g} mm",
         f"the newest {same_grasp.MOST_LOGS:,} logs or {power(same_grasp.MOST_COMPARED)} frames",
         f"are in the other to {same_grasp.NOISE_SHARE:g} of its noise",
-        f"or to {1e4 * same_grasp.DIGITS:g} · 10⁻⁴ of the largest",
+        f"or to {1e4 * same_grasp.ROUNDING_SHARE:g} · 10⁻⁴ of the largest",
         f"the presets' ({1e3 * PILLARS['pitch']:g} mm, {1e3 * TAXELS['pitch']:g} mm)",
         f"nine pillars, {1e3 * PILLARS['pitch']:g} mm apart",
         "of {} × {} taxels, {:g} mm apart".format(*TAXELS["grid"], 1e3 * TAXELS["pitch"]),

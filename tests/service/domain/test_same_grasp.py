@@ -9,7 +9,16 @@ from scipy.spatial import cKDTree
 import estimators
 from db.records import SamplesOfLog, Signature
 from service.domain import same_grasp
-from service.domain.same_grasp import OF_FORCE, SUMS, Grasps, Sums, find_alike, fingerprint, signature, with_copies
+from service.domain.same_grasp import (
+    OF_FORCE,
+    PROJECTIONS,
+    Grasps,
+    ProjectedFrames,
+    find_alike,
+    fingerprint,
+    signature,
+    with_copies,
+)
 from slipcore import GraspLog
 from slipcore.samples import FrictionSamples
 from stiction_client.support import notes
@@ -32,7 +41,7 @@ def test_times_places_names_and_precision_leave_the_fingerprint_as_it_is(
         replace(ramp, force=np.where(ramp.force == 0.0, -0.0, ramp.force)),
     )
     assert {fingerprint(other) for other in others} == {own}
-    monkeypatch.setattr(same_grasp, "FRAMES", 7)
+    monkeypatch.setattr(same_grasp, "FRAMES_AT_ONCE", 7)
     assert fingerprint(ramp) == own
 
 
@@ -57,8 +66,8 @@ def noisy(ramp: GraspLog, seed: int, noise: float = 1e-3) -> GraspLog:
 
 
 def alike(one: GraspLog, other: GraspLog) -> bool:
-    found = Sums(signature(one)).are_alike(Sums(signature(other)))
-    assert Sums(signature(other)).are_alike(Sums(signature(one))) == found
+    found = ProjectedFrames(signature(one)).are_alike(ProjectedFrames(signature(other)))
+    assert ProjectedFrames(signature(other)).are_alike(ProjectedFrames(signature(one))) == found
     return found
 
 
@@ -183,9 +192,9 @@ def test_parts_of_a_grasp_and_the_whole_are_one_in_any_order(
 
 def test_a_quiet_hold_whose_frames_are_all_near_is_known_again_in_its_half() -> None:
     """Thousands of frames lie within rounding of each other; of each a few are looked at."""
-    steady = np.linspace(0.1, 1.0, SUMS) + 1e-5 * np.random.default_rng(4).standard_normal((5_000, SUMS))
+    steady = np.linspace(0.1, 1.0, PROJECTIONS) + 1e-5 * np.random.default_rng(4).standard_normal((5_000, PROJECTIONS))
     whole, half, heavier = (
-        Sums(OF_FORCE + each.astype("<f4").tobytes()) for each in (steady, steady[::2], 1.01 * steady)
+        ProjectedFrames(OF_FORCE + each.astype("<f4").tobytes()) for each in (steady, steady[::2], 1.01 * steady)
     )
     assert whole.are_alike(half)
     assert half.are_alike(whole)
