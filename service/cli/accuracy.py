@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import Mapping, Picture, read_log, refuse_inputs
+from service.cli.connection import connected
+from service.cli.inputs import read_log, refuse_inputs
+from service.cli.options import DEFAULT_URL, Key, Mapping, Picture, Url
 from service.cli.output import print_json, print_table
 from service.cli.progress import counted, shown_progress
-from service.cli.remote import DEFAULT_URL, Key, Url, connected
 from service.formatting import number
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from service.cli.connection import connected
+from service.cli.options import DEFAULT_URL, Json, Key, Limit, Url
 from service.cli.output import print_json, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 
 COLUMNS = ("at", "actor", "address", "action", "subject", "details")
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
+from service.cli.options import Json
 from service.cli.output import plain, print_json, print_table, printable
 from service.cli.progress import counted, shown_progress
 
@@ -20,7 +21,6 @@ Folder = Annotated[Path, typer.Argument(help="A folder that `stiction benchmark 
 Processes = Annotated[
     int | None, typer.Option(min=1, help="Processes of this machine; as many as it has cores if not said.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 MOST_NAMED = 20
 """Reasons that are printed; all are in the files."""
 

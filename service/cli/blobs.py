@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from db.defaults import QUARANTINE_AGE
-from service.cli.database import Url, command_actor, opened, opened_blobs
 from service.cli.durations import duration
+from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
     from db.blobs import BlobStore

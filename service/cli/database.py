@@ -1,24 +1,17 @@
 """Commands on the database: its schema (upgrade, downgrade, current, check), and copies of all that is stored."""
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
+from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
-    from db.blobs import BlobStore
     from db.database import Database
-    from db.records import Actor
 
 app = typer.Typer(help="Create, upgrade, check, back up and restore what is stored.", no_args_is_help=True)
-Url = Annotated[
-    str | None, typer.Option("--database-url", help="SQLAlchemy URL; by default the one that the service uses.")
-]
 
 REFERS_TO_NONE = (
     "the database refers to no file: the service starts without any log, and the {} files there belong to none. They "
@@ -177,60 +170,7 @@ def adopt(database_url: Url = None) -> None:
         typer.echo(REFERS_TO_NONE.format(adopted.present), err=True)
 
 
-def opened_blobs() -> "BlobStore":
-    """The service's own blob store."""
-    from db.blobs import open_blobs
-    from service.processes import data_folder
-    from service.settings import Settings
-
-    settings = Settings()
-    data_folder.prepare(settings.data_folder)
-    return open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
-
-
-def command_actor() -> "Actor":
-    """Whoever runs this command, as the audit trail names it."""
-    import getpass
-
-    from db.records import Actor
-
-    try:
-        user = getpass.getuser()
-    except (KeyError, OSError):  # a container's user without a name
-        user = str(os.getuid())
-    return Actor(f"command:{user[:100]}")
-
-
 def _tell(what: str, count: int) -> None:
     """Say on standard error what was copied, blobs once in a while."""
     if what != "blobs" or count % 100 == 0:
         typer.echo(f"{what}: {count}", err=True)
-
-
-@contextmanager
-def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]:
-    """The database at this URL, or the service's own; raises ``NotFound`` for a file that isn't there.
-
-    SQLite would make one: in a folder that was named wrongly, a command should not leave a database behind. Raises
-    ``UnusableFolder`` where no folder can have that name.
-    """
-    from db.database import Database
-    from db.errors import NotFound
-    from service.processes import data_folder, private_files
-    from service.settings import Settings
-
-    private_files.withhold()
-    if url is None:
-        settings = Settings()
-        if may_be_new:
-            data_folder.prepare(settings.data_folder)
-        elif settings.database_url is None:
-            data_folder.require_possible(settings.data_folder)
-        url = settings.resolved_database_url
-    database = Database(url)
-    if database.is_missing and not may_be_new:
-        raise NotFound("database", str(database.engine.url.database))
-    try:
-        yield database
-    finally:
-        database.close()

@@ -7,6 +7,14 @@ NOT_FEASIBLE = 5
 INTERRUPTED = 130
 """As shells have it of what SIGINT ended; typer leaves with it, too."""
 
+CODE_OF_STATUS = {
+    "failed": FAILURE,
+    "refused": INPUT_REFUSED,
+    "rejected": SERVICE_REFUSED,
+    "cancelled": SERVICE_REFUSED,
+}
+"""How an upload ended, as an exit code: our fault, data that allow no fit, not wanted, a file that is not taken."""
+
 
 def message(error: Exception) -> str:
     """What is said of an error before the command ends."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -13,15 +13,6 @@ from service.cli.progress import shown_progress
 if TYPE_CHECKING:
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison, Reconstruction
-
-SensorModelFile = Annotated[
-    Path | None,
-    typer.Option("--sensor-model", help="Correct the log by this JSON, which `stiction sensors calibrate` writes."),
-]
-GelFile = Annotated[
-    Path | None,
-    typer.Option("--gel", help="Of a sensor without forces: a JSON file of its gel, by which they are reconstructed."),
-]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from service.cli.connection import connected
+from service.cli.options import DEFAULT_URL, Json, Key, Limit, Url
 from service.cli.output import print_json, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 
 app = typer.Typer(help="Look at the jobs of a service, and cancel them.", no_args_is_help=True)
 COLUMNS = ("id", "kind", "status", "stage", "material", "reason", "created_at")

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from service.cli.database import Url, command_actor, opened, opened_blobs
 from service.cli.durations import moment_to_come
+from service.cli.options import Json
 from service.cli.output import print_json, print_table
+from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
     from db.database import Database
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="Make, list and revoke access keys.", no_args_is_help=True)
 GROUP = re.compile(r"[A-Za-z0-9]([A-Za-z0-9 ._-]{0,98}[A-Za-z0-9._-])?")
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
 @app.command()

@@ -6,8 +6,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from estimators.method_names import METHODS
-from service.cli.inspection import GelFile, SensorModelFile, comparison, inspect_log
+from service.cli.inputs import read_log, refuse_inputs
+from service.cli.inspection import comparison, inspect_log
+from service.cli.options import (
+    DETECTOR_HELP,
+    METHOD_HELP,
+    FrameRate,
+    GelFile,
+    Json,
+    Log,
+    Logs,
+    Mapping,
+    Picture,
+    Rest,
+    Scale,
+    SensorModelFile,
+)
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import interval, number
@@ -17,36 +31,6 @@ if TYPE_CHECKING:
     from estimators import FrictionModel
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison
-
-Log = Annotated[
-    Path,
-    typer.Argument(help="A grasp log in any format of docs/formats.md: NPZ, Tac3D, tracked markers, MCAP, ROS bag, …"),
-]
-DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
-METHOD_HELP = f"Estimator: {', '.join(METHODS[:-1])} or {METHODS[-1]}."
-Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
-
-
-def _as_png(path: Path | None) -> Path | None:
-    if path is not None and path.suffix.lower() != ".png":
-        raise typer.BadParameter(f"{path.name}; allowed: a name that ends in .png")
-    return path
-
-
-Picture = Annotated[Path | None, typer.Option(callback=_as_png, help="Write a picture of slip over time to this PNG.")]
-Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pixel.")]
-FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]
-Mapping = Annotated[
-    Path | None,
-    typer.Option(
-        "--mapping", help="A JSON file that says which column or field is what, or a preset: papillarray, uskin."
-    ),
-]
-Rest = Annotated[
-    str | None,
-    typer.Option(help="Frame without contact: first, least contact, its number, or a file of the sensor alone."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
 def detect(
@@ -204,44 +188,6 @@ def export(
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
     if by_displacement := sum(recording.log.has_reconstructed_force for recording in recordings):
         typer.echo(f"forces of {by_displacement} of {len(logs)} grasp(s) are reconstructed from displacement")
-
-
-def refuse_inputs(output: Path, *inputs: Path | None) -> None:
-    """Raises ``InvalidInput`` where a command would write over what it reads, or into it, by whatever name or link."""
-    from slipcore import InvalidInput
-
-    for path in inputs:
-        if path is None or not path.exists() or not output.exists():
-            continue
-        if output.samefile(path) or output.resolve().is_relative_to(path.resolve()):
-            raise InvalidInput("output", f"{output}, which is read", "another file")
-
-
-def read_log(
-    path: Path,
-    mapping: Path | None = None,
-    scale: float | None = None,
-    frame_rate: float | None = None,
-    rest: str | None = None,
-) -> "GraspLog":
-    """The log in a file, by what the options of a command say about it."""
-    from service import formats
-
-    return formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
-
-
-def mapping_text(path: Path | None) -> str | None:
-    """What a mapping's file says, or the name of a preset."""
-    from service.formats.presets import PRESETS
-
-    if path is None or (str(path) in PRESETS and not path.exists()):
-        return None if path is None else str(path)
-    return path.read_text(encoding="utf-8")
-
-
-def rest_of(rest: str | None) -> str | Path | None:
-    """The word or number that names a frame at rest, or a file that shows the sensor alone."""
-    return Path(rest) if rest is not None and Path(rest).is_file() else rest
 
 
 def print_comparison(found: "ForceComparison") -> None:

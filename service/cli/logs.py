@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.connection import connected
+from service.cli.options import DEFAULT_URL, Json, Key, Limit, Url
 from service.cli.output import print_json, print_lines, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 from service.formatting import number, size
 
 if TYPE_CHECKING:

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.connection import connected
+from service.cli.exit_codes import CODE_OF_STATUS
+from service.cli.options import DEFAULT_URL, Json, Key, MaterialName, Method, Url
 from service.cli.output import print_json, print_lines, print_table, when
-from service.cli.remote import CODE_OF_STATUS, DEFAULT_URL, Json, Key, MaterialName, Method, Url, connected
 from service.formatting import interval, number
 
 if TYPE_CHECKING:

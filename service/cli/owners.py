@@ -4,7 +4,8 @@ from typing import Annotated
 
 import typer
 
-from service.cli.remote import DEFAULT_URL, Key, MaterialName, Url, connected
+from service.cli.connection import connected
+from service.cli.options import DEFAULT_URL, Key, MaterialName, Url
 
 app = typer.Typer(help="Show and change whose a material is.", no_args_is_help=True)
 Owner = Annotated[str, typer.Argument(help="A key such as key:3f9c2a7b51de, or a group of keys such as group:lab.")]

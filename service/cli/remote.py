@@ -1,18 +1,29 @@
 """Commands that ask a running service: upload, lookup, plan."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from estimators.method_names import METHODS
-from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
-from service.cli.local import FrameRate, Mapping, Rest, Scale, rest_of
+from service.cli.connection import connected
+from service.cli.exit_codes import CODE_OF_STATUS
+from service.cli.inputs import rest_of
+from service.cli.options import (
+    DEFAULT_URL,
+    FrameRate,
+    GraspingSensor,
+    Json,
+    Key,
+    Mapping,
+    MaterialName,
+    Method,
+    Rest,
+    Scale,
+    Url,
+    Velocity,
+)
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted
 from service.cli.sources import Source, found
@@ -21,52 +32,9 @@ from service.formatting import at_least, number
 if TYPE_CHECKING:
     from stiction_client import FrictionAnswer, FrictionClient, FrictionModel, NextGrasp, RequiredForce
 
-Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
-Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
-Limit = Annotated[int, typer.Option("--limit", min=1, help="So many at most.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
-MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
-Method = Annotated[
-    str, typer.Option("--method", help=f"Whose current model: {', '.join(METHODS[:-1])}, or auto: the recommended one.")
-]
-GraspingSensor = Annotated[
-    str | None, typer.Option("--sensor", help="That grasps: friction as it shows it, where the model knows its gain.")
-]
-Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
-
-CODE_OF_STATUS = {
-    "failed": FAILURE,
-    "refused": INPUT_REFUSED,
-    "rejected": SERVICE_REFUSED,
-    "cancelled": SERVICE_REFUSED,
-}
-"""How an upload ended, as an exit code: our fault, data that allow no fit, not wanted, a file that is not taken."""
 
 LARGEST_AREA = 0.02
 """m², of a hand: whoever names a larger contact area is asked back."""
-
-DEFAULT_URL = "http://127.0.0.1:8000"
-
-
-@contextmanager
-def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
-    """A client of the service, whose errors say what to do where the service can't: a likely name, how to start one."""
-    from stiction_client import ConnectionFailed, FrictionClient, problems
-
-    with FrictionClient(url, key=key) as client:
-        try:
-            yield client
-        except problems.UnknownMaterial as problem:
-            near = get_close_matches(problem.value or "", [material.name for material in client.materials()])
-            if near:
-                problem.add_note(f"did you mean {' or '.join(near)}?")
-            problem.add_note(
-                "`stiction upload --create` makes a new one; `stiction materials list` shows those there are"
-            )
-            raise
-        except ConnectionFailed as failure:
-            failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
-            raise
 
 
 def upload(

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Rest, Scale, read_log, refuse_inputs
-from service.cli.remote import DEFAULT_URL, Key, Url, connected
+from service.cli.connection import connected
+from service.cli.inputs import read_log, refuse_inputs
+from service.cli.options import DEFAULT_URL, DETECTOR_HELP, FrameRate, Key, Mapping, Rest, Scale, Url
 
 if TYPE_CHECKING:
     from service.report.page import Report

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import FAILURE, exit_code
+from service.cli.options import DEFAULT_URL, Url
 from service.cli.output import print_table
-from service.cli.remote import DEFAULT_URL, Url
 
 if TYPE_CHECKING:
     from service.settings import Settings

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.local import Json
+from service.cli.options import Json
 from service.cli.output import print_json, print_table, printable
 from service.formatting import number
 

@@ -7,10 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from service.cli.local import Mapping as MappingFile
-from service.cli.local import read_log, refuse_inputs
+from service.cli.connection import connected
+from service.cli.inputs import read_log, refuse_inputs
+from service.cli.options import DEFAULT_URL, Json, Key, Url
+from service.cli.options import Mapping as MappingFile
 from service.cli.output import print_json, print_table
-from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import interval, number
 from service.whole_files import write_whole
 

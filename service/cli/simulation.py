@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED
-from service.cli.local import Picture, refuse_inputs
+from service.cli.inputs import refuse_inputs
+from service.cli.options import Picture
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import number

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from service.cli.local import mapping_text
+from service.cli.inputs import mapping_text
 
 if TYPE_CHECKING:
     from slipcore import GraspLog

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Rest, Scale, read_log
+from service.cli.inputs import read_log
+from service.cli.options import DEFAULT_URL, DETECTOR_HELP, FrameRate, Json, Key, Mapping, Rest, Scale, Url
 from service.cli.output import print_json, print_lines
-from service.cli.remote import DEFAULT_URL, Key, Url
 from service.formatting import number
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import Json, refuse_inputs
+from service.cli.inputs import refuse_inputs
+from service.cli.options import Json
 from service.cli.output import print_json, print_lines
 from service.cli.progress import counted
 from service.formatting import number

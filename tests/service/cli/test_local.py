@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import typer
 
-from service.cli import local
+from service.cli import inputs, local
 from slipcore import ContactFriction, GraspLog, InvalidInput
 from slipcore.forces.reconstruction.comparison import Agreement, ForceComparison
 from tests.service.domain.test_doubtful_logs import MODEL
@@ -33,29 +33,29 @@ def test_nothing_that_is_read_is_written_over_by_whatever_name(tmp_path: Path) -
     folder.mkdir()
     (folder / "part.npy").touch()
     (tmp_path / "link.npz").symlink_to(log)
-    local.refuse_inputs(other, log, None, folder, tmp_path / "absent")
-    local.refuse_inputs(tmp_path / "new.npz", tmp_path / "new.npz")
+    inputs.refuse_inputs(other, log, None, folder, tmp_path / "absent")
+    inputs.refuse_inputs(tmp_path / "new.npz", tmp_path / "new.npz")
     for output, read in ((log, log), (tmp_path / "link.npz", log), (folder / "part.npy", folder)):
         with pytest.raises(InvalidInput, match=f"output is {output}, which is read; allowed: another file"):
-            local.refuse_inputs(output, other, read)
+            inputs.refuse_inputs(output, other, read)
 
 
 def test_a_mapping_is_a_file_or_else_a_preset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert local.mapping_text(None) is None
-    assert local.mapping_text(Path("uskin")) == "uskin"
+    assert inputs.mapping_text(None) is None
+    assert inputs.mapping_text(Path("uskin")) == "uskin"
     Path("uskin").write_text('{"time": "µ"}', encoding="utf-8")
-    assert local.mapping_text(Path("uskin")) == '{"time": "µ"}'
+    assert inputs.mapping_text(Path("uskin")) == '{"time": "µ"}'
     with pytest.raises(FileNotFoundError):
-        local.mapping_text(Path("absent.json"))
+        inputs.mapping_text(Path("absent.json"))
 
 
 def test_rest_is_a_file_where_there_is_one_of_that_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert (local.rest_of(None), local.rest_of("first")) == (None, "first")
+    assert (inputs.rest_of(None), inputs.rest_of("first")) == (None, "first")
     Path("first").touch()
-    assert local.rest_of("first") == Path("first")
-    assert local.rest_of(str(tmp_path)) == str(tmp_path)
+    assert inputs.rest_of("first") == Path("first")
+    assert inputs.rest_of(str(tmp_path)) == str(tmp_path)
 
 
 CONTACT = ContactFriction(0.45, 0.4, 0.5, is_bound=False, reason="a plateau of 9 frames")

@@ -15,7 +15,7 @@ from db.paging import Window
 from db.records import AuditEntry, AuditFilter
 from db.repositories import audit
 from service.cli import main
-from service.cli.database import command_actor
+from service.cli.stores import command_actor
 from service.jobs import garbage
 from service.jobs.retention import Retention
 from tests.service.jobs.clocks import vouch_for_the_clock
