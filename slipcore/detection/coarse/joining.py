@@ -6,15 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import borrowed, compiled
-from slipcore.detection.coarse.layers import (
-    FILTER_WEIGHT,
-    LAYERS_WEIGHT,
-    MOST,
-    Believed,
-    Layers,
-    PressedElements,
-    look_at_layers,
-)
+from slipcore.detection.coarse.layers import Layers, PressedElements, layer_tuning, look_at_layers
+from slipcore.detection.forces_only.tuning import Considered
 from slipcore.detection.shared.records import Decision
 from slipcore.frames import BoolArray, FloatArray
 
@@ -38,9 +31,9 @@ class Evidence(NamedTuple):
 
 
 @compiled
-def join(frame: Evidence, layers: Layers, considered: Believed, after: Layers, decision: Decision) -> None:
+def join(frame: Evidence, layers: Layers, considered: Considered, after: Layers, decision: Decision) -> None:
     """Fill the layers ``after`` the frame, and the decision; what it is given may be plain tuples of the same."""
-    seen, before, known = Evidence(*borrowed(frame)), Layers(*borrowed(layers)), Believed(*borrowed(considered))
+    seen, before, known = Evidence(*borrowed(frame)), Layers(*borrowed(layers)), Considered(*borrowed(considered))
     kept, decided = Layers(*borrowed(after)), Decision(*borrowed(decision))
     kept.load[:] = before.load
     kept.level[:] = before.level
@@ -48,13 +41,13 @@ def join(frame: Evidence, layers: Layers, considered: Believed, after: Layers, d
     kept.normal[:] = before.normal
     kept.odds[:] = before.odds
     look_at_layers(pressed_elements(seen), kept, known)
-    options = known.options
+    tuning = layer_tuning(known.settings)
     n, m = seen.contact.shape
     for i in range(n):
         for j in range(m):
-            odds = log_odds(seen.by_forces[i, j], options[MOST])
-            odds += options[FILTER_WEIGHT] * log_odds(seen.by_filter[i, j], options[MOST])
-            odds += options[LAYERS_WEIGHT] * kept.odds[i * m + j] if seen.stay[i, j] else 0.0
+            odds = log_odds(seen.by_forces[i, j], tuning.largest_sum)
+            odds += tuning.filter_weight * log_odds(seen.by_filter[i, j], tuning.largest_sum)
+            odds += tuning.layers_weight * kept.odds[i * m + j] if seen.stay[i, j] else 0.0
             decided.slip[i, j], decided.probability[i, j] = odds > 0.0, 1.0 / (1.0 + math.exp(-odds))
 
 

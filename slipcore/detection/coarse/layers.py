@@ -9,13 +9,14 @@ both the forces of elements and what share of each still sticks follow from the 
 """
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.compilation import compiled
+from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NUMERICS, CoarseOptions
-from slipcore.detection.forces_only.tuning import frictions, prior
+from slipcore.detection.forces_only.tuning import Considered, frictions, prior
 from slipcore.frames import FloatArray
 
 _LEAST_FORCE, _LEAST_SPREAD = NUMERICS.least_element_force, NUMERICS.least_spread
@@ -68,35 +69,35 @@ class SummedLoad(NamedTuple):
     lever: float
 
 
-class Believed(NamedTuple):
-    """Friction coefficients [g] that are considered, their log weights [g] beforehand, and options as numbers."""
+class LayerTuning(NamedTuple):
+    """Options of ``coarse`` that the kernels of layers read, in the same units; see ``CoarseOptions``."""
 
-    friction: FloatArray
-    prior: FloatArray
-    options: FloatArray
+    least_load_change: float
+    load_deviations: float
+    layer_misfit: float
+    layer_evidence: float
+    layer_stick_share: float
+    layer_stick_width: float
+    spring_spread: float
+    largest_sum: float
+    filter_weight: float
+    layers_weight: float
 
 
-(
-    LEAST_CHANGE, DEVIATIONS, MISFIT, EVIDENCE, STICK_SHARE, WIDTH, SPREAD, MOST, FILTER_WEIGHT, LAYERS_WEIGHT,
-) = range(10)  # fmt: skip
-"""Rows of ``Believed.options``."""
+_TUNING = len(LayerTuning._fields)
 
 
-def believed(options: CoarseOptions) -> Believed:
-    """What kernels take of the options."""
-    numbers = (
-        options.least_load_change,
-        options.load_deviations,
-        options.layer_misfit,
-        options.layer_evidence,
-        options.layer_stick_share,
-        options.layer_stick_width,
-        options.spring_spread,
-        options.largest_sum,
-        options.filter_weight,
-        options.layers_weight,
-    )
-    return Believed(frictions(options), prior(options), np.array(numbers))
+@cache
+def considered(options: CoarseOptions) -> Considered:
+    """What the kernels take of the options."""
+    settings = [getattr(options, name) for name in LayerTuning._fields]
+    return Considered(frictions(options), prior(options), np.array(settings, float))
+
+
+@compiled
+def layer_tuning(settings: FloatArray) -> LayerTuning:
+    """The options by name, from their array."""
+    return LayerTuning(*unpack(settings, _TUNING))
 
 
 def no_layers(elements: int, options: CoarseOptions) -> Layers:
@@ -106,9 +107,9 @@ def no_layers(elements: int, options: CoarseOptions) -> Layers:
 
 
 @compiled
-def look_at_layers(frame: PressedElements, kept: Layers, known: Believed) -> None:
+def look_at_layers(frame: PressedElements, kept: Layers, known: Considered) -> None:
     """Look at the layers anew once the load has changed by more than noise; writes to what is ``kept``."""
-    options = known.options
+    tuning = layer_tuning(known.settings)
     now = sums(frame.place, frame.normal, frame.sideways)
     if now.normal <= _LEAST_FORCE:
         kept.load[:] = 0.0
@@ -119,14 +120,14 @@ def look_at_layers(frame: PressedElements, kept: Layers, known: Believed) -> Non
         begin(kept, now.normal)
     # twice as much as elsewhere: noise that is taken for a load that turns back makes all of them stick
     of_noise = 2.0 * _MEAN_CHANGE * frame.noise * math.sqrt(2.0 * np.count_nonzero(frame.normal))
-    if change(kept.load, now) <= options[LEAST_CHANGE] * now.normal + options[DEVIATIONS] * of_noise:
+    if change(kept.load, now) <= tuning.least_load_change * now.normal + tuning.load_deviations * of_noise:
         return
     grow(kept, frame.normal, now.normal)
     kept.load[NORMAL], kept.load[X], kept.load[Y], kept.load[TURN] = now.normal, now.x, now.y, now.turn
     kept.normal[:] = frame.normal
     weigh_frictions(frame, now, kept, known)
     of_gel = spread_of_stiffness(frame.normal, frame.depth) ** 4
-    kept.odds[:] *= of_gel / (of_gel + options[SPREAD] ** 4)
+    kept.odds[:] *= of_gel / (of_gel + tuning.spring_spread**4)
 
 
 @compiled
@@ -217,11 +218,12 @@ def spread_of_stiffness(normal: FloatArray, depth: FloatArray) -> float:
 
 
 @compiled
-def weigh_frictions(seen: PressedElements, now: SummedLoad, kept: Layers, considered: Believed) -> None:
+def weigh_frictions(seen: PressedElements, now: SummedLoad, kept: Layers, grid: Considered) -> None:
     """Fill the log-odds [k] of slip: under each friction the share that sticks, weighed by how well it explains the
     elements' forces.
     """
-    friction, options, normal = considered.friction, considered.options, seen.normal
+    friction, normal = grid.friction, seen.normal
+    tuning = layer_tuning(grid.settings)
     spacing = kept.load[SPACING]
     full = min(int(now.normal / spacing), kept.traction.shape[1] - 1)
     known = min(full, int(kept.load[REACHED]))
@@ -232,24 +234,24 @@ def weigh_frictions(seen: PressedElements, now: SummedLoad, kept: Layers, consid
     )
     rise = rises(kept.level, normal, full, known)
     for k in range(len(friction)):
-        core = load_layers(kept.traction[k], friction[k], options[MISFIT], now, spacing, full)
+        core = load_layers(kept.traction[k], friction[k], tuning.layer_misfit, now, spacing, full)
         misfit = left = size = 0.0
         for i in range(len(normal)):
             if normal[i] <= 0.0:
                 continue
             stuck = stick_share(kept.level[:, i], normal[i], core, now.normal, spacing, full, known)
-            slips[k, i] = 1.0 / (1.0 + math.exp((stuck - options[STICK_SHARE]) / options[WIDTH]))
+            slips[k, i] = 1.0 / (1.0 + math.exp((stuck - tuning.layer_stick_share) / tuning.layer_stick_width))
             x, y = force_of_layers(kept.traction[k], rise[i], seen.place[i], now)
-            variance = max(seen.noise**2 + (options[MISFIT] * friction[k] * normal[i]) ** 2, _LEAST_FORCE**2)
+            variance = max(seen.noise**2 + (tuning.layer_misfit * friction[k] * normal[i]) ** 2, _LEAST_FORCE**2)
             square = (seen.sideways[i, 0] - x) ** 2 + (seen.sideways[i, 1] - y) ** 2
             misfit += 0.5 * square / variance + math.log(variance)
             left, size = left + square, size + variance
-        weights[k] = considered.prior[k] - options[EVIDENCE] * misfit
+        weights[k] = grid.prior[k] - tuning.layer_evidence * misfit
         unexplained[k] = left / size
     weights = np.exp(weights - weights.max())
     weights /= weights.sum()
     fits = 1.0 / (1.0 + ((weights * unexplained).sum() / 2.0) ** 2)
-    least = 1.0 / (1.0 + math.exp(options[MOST]))
+    least = 1.0 / (1.0 + math.exp(tuning.largest_sum))
     for i in range(len(normal)):
         kept.odds[i] = 0.0
         if normal[i] > 0.0:

@@ -6,7 +6,7 @@ where several stick beside each other their markers show when one does not. How 
 from how the contact has grown (``layers``). Log-odds of all three are added.
 """
 
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.special import expit
 
 from slipcore.defaults import CoarseOptions, FilterOptions
 from slipcore.detection.coarse.joining import Evidence, join
-from slipcore.detection.coarse.layers import Believed, Layers, believed, no_layers
+from slipcore.detection.coarse.layers import Layers, considered, no_layers
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.forces_only import method as by_force
@@ -92,14 +92,9 @@ def step(
         decision.probability,
         after.probability,
     )
-    plain: list[Any] = [tuple(part) for part in (evidence, state.layers, _believed(options), layers, joined)]
+    plain: list[Any] = [tuple(part) for part in (evidence, state.layers, considered(options), layers, joined)]
     join(*plain)  # numba is slow at named tuples from Python
     return CoarseState(forces, layers, after, frame), joined
-
-
-@cache
-def _believed(options: CoarseOptions) -> Believed:
-    return believed(options)
 
 
 @lru_cache(maxsize=16)

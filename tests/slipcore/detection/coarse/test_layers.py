@@ -6,21 +6,21 @@ import pytest
 from slipcore.defaults import CoarseOptions
 from slipcore.detection.coarse.layers import (
     NORMAL,
-    Believed,
     Layers,
     PressedElements,
-    believed,
+    considered,
     load_layers,
     look_at_layers,
     no_layers,
     spread_of_stiffness,
     sums,
 )
+from slipcore.detection.forces_only.tuning import Considered
 from slipcore.frames import FloatArray
 
 FRICTION, FORCE, RADIUS, SIDE = 0.45, 8.0, 5e-3, 6
 OPTIONS = CoarseOptions()
-CONSIDERED = believed(OPTIONS)
+CONSIDERED = considered(OPTIONS)
 
 
 def fine_points() -> tuple[FloatArray, FloatArray]:
@@ -56,7 +56,7 @@ def depth() -> FloatArray:
     return np.full(len(PLACE), 1e-3)
 
 
-def follow_layers(layers: Layers, seen: PressedElements, considered: Believed) -> Layers:
+def follow_layers(layers: Layers, seen: PressedElements, considered: Considered) -> Layers:
     """The layers after a frame."""
     after = Layers(*(array.copy() for array in layers))
     look_at_layers(seen, after, considered)
