@@ -47,7 +47,7 @@ LAYOUT = {
     "slipcore/detection/strain_rate/step.py": {"ROWS"},
     "estimators/linear/grasp_statistics.py": {"POOLED", "UNKNOWN", "ALIKE"},
     "slipcore/contact/solver/tangent_space.py": {"OUTSIDE", "STICK", "SLIP"},
-    "slipcore/detection/filter/slip_limit.py": {"ROOMS", "_BLOCK"},
+    "slipcore/detection/filter/slip_limit.py": {"SCRATCH_ROWS", "_BLOCK"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
     "slipcore/detection/shared/lasting_noise.py": {"SPREAD", "STEP", "ROWS", "OF_STENCIL", "OF_QUARTILE"},
     "slipcore/patch/regions.py": {"NOWHERE"},

@@ -1,10 +1,11 @@
 """How far the object moves over an element before it slips: in proportion to how deep it was pressed in.
 
-An element of a contact sticks until the object has moved over it by c times the depth that it was pressed in since it
-touched, c = μ E*/G* for friction μ and the moduli of normal and tangential load (Jäger, J. Tribol. 120 (1998) 677). So
-each is a spring that slides at c times its own compression (Popov and Heß, Method of Dimensionality Reduction, 2015),
-and what loads do that turn back or change follows. c is not presumed: each of a row of values is as probable as what
-markers show of all elements makes it, beside the chance that there is no such c.
+An element sticks until the object has moved over it by c times the depth to which it was pressed in since it touched,
+with c = μ E*/G* for friction μ and the moduli of normal and tangential load (Jäger, J. Tribol. 120 (1998) 677). So each
+element is a spring in series with a slider, which slides at c times the element's own compression (Popov and Heß,
+Method of Dimensionality Reduction, 2015); loads that turn back or change need no rule of their own. This *limit* c is
+inferred: each of a row of values, and that there is none, is as probable as what the markers of all elements show makes
+it.
 """
 
 import math
@@ -21,15 +22,21 @@ from slipcore.detection.shared.records import Memory
 from slipcore.frames import BoolArray, FloatArray
 
 COUNT = NUMERICS.slip_limits
-_LEAST_RATIO, _SUREST = NUMERICS.least_ratio, math.exp(NUMERICS.surest_limit)
-"""Least ratio of motion to depth, and largest odds of slip, or of stick, by one limit."""
+_LEAST_RATIO, _LARGEST_ODDS = NUMERICS.least_ratio, math.exp(NUMERICS.surest_limit)
+"""Least ratio of elongation to compression, and largest odds of slip, or of stick, by one limit."""
 _BLOCK = 64
-"""A logarithm for so many likelihoods, none of which is below 0.003."""
-ROOMS = 7
-_TAKEN, _COMPRESSION, _ODDS, _GROWTH, _SOONER, _SHOWN, _SLIPS = range(ROOMS)
-"""Rows of numbers of each element: what it has taken up and its compression, m; its odds of stick by the limit that is
-looked at, their growth from one limit to the next and what is left of them for slip that does not show yet; how
-probable slip is by its marker; and by all limits."""
+"""Likelihoods that are multiplied before a logarithm is taken: none is below 0.003, so that none underflows."""
+SCRATCH_ROWS = 7
+(
+    _ELONGATION,  # of its spring, m
+    _COMPRESSION,  # m
+    _ODDS,  # of stick, by the limit that is evaluated
+    _ODDS_RATIO,  # of these from one limit to the next
+    _LAG_FACTOR,  # of these, for slip that the marker does not show yet
+    _SHOWN,  # probability of slip by its marker
+    _SLIP,  # probability of slip by all limits
+) = range(SCRATCH_ROWS)
+"""Rows of the scratch array, one number an element each."""
 
 
 @compiled(inline=True)
@@ -43,11 +50,12 @@ def follow_springs(
     after: FloatArray,
     rows: FloatArray,
 ) -> tuple[float, float]:
-    """Carry on what each element has taken up of the ``motion``, up to ``limit`` times its compression, and fill the
-    size of that and the compression, m, in ``rows``; sums of compression and motion, m.
+    """Stretch each element's spring by the ``motion``, up to ``limit`` times its compression; fill elongation and
+    compression in ``rows``, and return the sums of compression and of motion, m.
 
-    ``surface``: displacement [n, m, 3] in the last frame and now, which elements touch and which did throughout; those
-    that have just touched begin anew. No compression counts as less than the ``deviation`` of a marker coordinate, m.
+    ``surface``: displacement [n, m, 3] in the last frame and now, which elements touch, and which did in both; the
+    springs of those that have just touched begin unstretched. A compression counts as the ``deviation`` of a marker
+    coordinate, m, at least.
     """
     last, now, contact, stays = surface
     n, m = contact.shape
@@ -61,10 +69,10 @@ def follow_springs(
         i, j = places[e]
         after[TOUCH_DEPTH, i, j] = elements[TOUCH_DEPTH, i, j]
         x, y = elements[SPRING_X, i, j] + motion.x[e], elements[SPRING_Y, i, j] + motion.y[e]
-        taken, compression = math.sqrt(x * x + y * y), max(-now[i, j, 2] - elements[TOUCH_DEPTH, i, j], deviation)
-        share = limit * compression / taken if taken > limit * compression else 1.0
+        elongation, compression = math.sqrt(x * x + y * y), max(-now[i, j, 2] - elements[TOUCH_DEPTH, i, j], deviation)
+        share = limit * compression / elongation if elongation > limit * compression else 1.0
         after[SPRING_X, i, j], after[SPRING_Y, i, j] = share * x, share * y
-        rows[_TAKEN, e], rows[_COMPRESSION, e] = taken, compression
+        rows[_ELONGATION, e], rows[_COMPRESSION, e] = elongation, compression
         depth += compression
         moved += math.sqrt(motion.x[e] * motion.x[e] + motion.y[e] * motion.y[e])
     return depth, moved
@@ -72,8 +80,8 @@ def follow_springs(
 
 @compiled(inline=True)
 def weigh_limits(found: FloatArray, tuning: Tuning, weights: FloatArray) -> float:
-    """Fill how probable each limit is and, last, that there is none, [COUNT + 1], by the log-likelihoods ``found`` and
-    a log-normal prior; the geometric mean of the limits.
+    """Fill ``weights`` [COUNT + 1], the posterior probability of each limit and, last, of none, from the
+    log-likelihoods ``found`` and a log-normal prior; return the geometric mean of the limits.
     """
     first, step = math.log(tuning.slip_limit_least), step_of_limits(tuning)
     usual, before, total, mean = math.log(tuning.slip_limit_usual), 0.0, 0.0, 0.0
@@ -92,7 +100,7 @@ def weigh_limits(found: FloatArray, tuning: Tuning, weights: FloatArray) -> floa
 
 @compiled
 def step_of_limits(tuning: Tuning) -> float:
-    """By how much the logarithms of two limits beside each other differ."""
+    """Difference of the logarithms of two neighbouring limits."""
     return math.log(tuning.slip_limit_largest / tuning.slip_limit_least) / (COUNT - 1)
 
 
@@ -106,11 +114,12 @@ def expect_slip(
     rows: FloatArray,
     shown_by: FloatArray,
 ) -> None:
-    """Fill ``EXPECTED`` by the log-odds of slip that the limits give each element, and ``shown_by`` [COUNT + 1] by the
-    log-likelihood of what markers show of all, by each limit and, last, if all slip alike; ``rows``: see ``ROOMS``.
+    """Fill ``EXPECTED`` with the log-odds of slip that the limits give each element, and ``shown_by`` [COUNT + 1] with
+    the log-likelihood of what the markers show of all, under each limit and, last, if all slip with one probability.
 
-    An element has by a limit slipped with the logistic function of the logarithm of what it took up over it, and by
-    how uncertain this is; what is shown comes late, by ``slip_limit_lag``.
+    Under a limit c the marker of an element shows slip with the probability logistic(log(r/c)/s): r is its elongation
+    over its compression, s² the sum of ``slip_limit_width``² and of the relative variance of the compression. Slip
+    itself is earlier, as by a limit of c exp(−``slip_limit_lag``).
     """
     first, step, count = math.log(tuning.slip_limit_least), step_of_limits(tuning), len(places)
     width2 = tuning.slip_limit_width * tuning.slip_limit_width
@@ -118,56 +127,56 @@ def expect_slip(
     for e in range(count):
         i, j = places[e]
         compression = rows[_COMPRESSION, e]
-        ratio, blur = max(rows[_TAKEN, e] / compression, _LEAST_RATIO), deviation / compression
+        ratio, blur = max(rows[_ELONGATION, e] / compression, _LEAST_RATIO), deviation / compression
         steep = 1.0 / math.sqrt(width2 + blur * blur)
         rows[_ODDS, e] = math.exp((first - math.log(ratio)) * steep)
-        rows[_GROWTH, e], rows[_SOONER, e] = math.exp(step * steep), math.exp(-tuning.slip_limit_lag * steep)
-        rows[_SHOWN, e], rows[_SLIPS, e] = shown_slip(after[PROBABILITY, i, j], tuning), 0.0
+        rows[_ODDS_RATIO, e], rows[_LAG_FACTOR, e] = math.exp(step * steep), math.exp(-tuning.slip_limit_lag * steep)
+        rows[_SHOWN, e], rows[_SLIP, e] = shown_slip(after[PROBABILITY, i, j], tuning), 0.0
         alike += rows[_SHOWN, e]
     alike /= count
     for k in range(COUNT):
         shown_by[k] = weigh_limit(rows, count, weights[k])
     shown_by[COUNT] = weigh_alike(rows[_SHOWN][:count], alike)
-    ruled, most = 1.0 - weights[COUNT], tuning.slip_limit_odds
+    some_limit, most = 1.0 - weights[COUNT], tuning.slip_limit_odds
     largest = math.exp(most)
     for e in range(count):
         i, j = places[e]
-        slips, sticks, told = rows[_SLIPS, e], ruled - rows[_SLIPS, e], 0.0
+        slips, sticks, log_odds = rows[_SLIP, e], some_limit - rows[_SLIP, e], 0.0
         if slips >= largest * sticks:
-            told = most
+            log_odds = most
         elif sticks >= largest * slips:
-            told = -most
+            log_odds = -most
         else:
-            told = math.log(slips / sticks)
-        after[EXPECTED, i, j] = ruled * told if ruled > 0.0 else 0.0
+            log_odds = math.log(slips / sticks)
+        after[EXPECTED, i, j] = some_limit * log_odds if some_limit > 0.0 else 0.0
 
 
 @compiled(fastmath={"reassoc"})
 def weigh_limit(rows: FloatArray, count: int, weight: float) -> float:
-    """Add to the probability of slip of each element what a limit of that ``weight`` gives, and take its odds on to the
-    next limit; log-likelihood of what markers show of all.
+    """Add what one limit of this ``weight`` gives to each element's probability of slip, and move the odds on to the
+    next limit; return the log-likelihood of what the markers show of all.
 
-    Its loop is over elements beside each other in memory, of which several are then worked out at once.
+    The loop runs over elements that lie side by side in memory and has no branches, so that it is vectorised.
     """
     total = 0.0
     for start in range(0, count, _BLOCK):
         end, likelihood = min(start + _BLOCK, count), 1.0
-        odds, growth, sooner = rows[_ODDS][start:end], rows[_GROWTH][start:end], rows[_SOONER][start:end]
-        shown, slips = rows[_SHOWN][start:end], rows[_SLIPS][start:end]
+        odds, ratio, lag = rows[_ODDS][start:end], rows[_ODDS_RATIO][start:end], rows[_LAG_FACTOR][start:end]
+        shown, slips = rows[_SHOWN][start:end], rows[_SLIP][start:end]
         for e in range(len(odds)):
-            late = 1.0 + min(max(odds[e], 1.0 / _SUREST), _SUREST)
-            now = 1.0 + min(max(sooner[e] * odds[e], 1.0 / _SUREST), _SUREST)
+            late = 1.0 + min(max(odds[e], 1.0 / _LARGEST_ODDS), _LARGEST_ODDS)
+            now = 1.0 + min(max(lag[e] * odds[e], 1.0 / _LARGEST_ODDS), _LARGEST_ODDS)
             both = 1.0 / (late * now)  # one division for both probabilities
             likelihood *= (1.0 - shown[e]) + (2.0 * shown[e] - 1.0) * (both * now)
             slips[e] += weight * (both * late)
-            odds[e] *= growth[e]
+            odds[e] *= ratio[e]
         total += math.log(likelihood)
     return total
 
 
 @compiled(fastmath={"reassoc"})
 def weigh_alike(shown: FloatArray, alike: float) -> float:
-    """The same if all slip as probably as that."""
+    """Log-likelihood of slip as ``shown`` [k] by markers if every element slips with the probability ``alike``."""
     total = 0.0
     for start in range(0, len(shown), _BLOCK):
         block, likelihood = shown[start : start + _BLOCK], 1.0
@@ -179,7 +188,7 @@ def weigh_alike(shown: FloatArray, alike: float) -> float:
 
 @compiled
 def shown_slip(p: float, tuning: Tuning) -> float:
-    """How probable slip of an element is by its marker, with even odds at the threshold, and no surer than believed."""
+    """Probability of slip by a marker: its odds shifted to ½ at the threshold, within ``slip_limit_trust``."""
     odds = (1.0 - tuning.threshold) / tuning.threshold
     shown = p * odds / (1.0 - p + p * odds)
     return float(min(max(shown, 1.0 - tuning.slip_limit_trust), tuning.slip_limit_trust))
@@ -187,9 +196,10 @@ def shown_slip(p: float, tuning: Tuning) -> float:
 
 @compiled
 def learn_limits(shown_by: FloatArray, progress: float, count: int, tuning: Tuning, found: FloatArray) -> None:
-    """Add to the log-likelihoods ``found`` what a step showed by ``count`` elements, as so many of one another's
-    neighbours and frames say the same: in proportion to its ``progress``, motion over compression. Old ones fade so,
-    too.
+    """Add what ``count`` elements showed in a step to the log-likelihoods ``found``, whose old part fades.
+
+    Neighbours and successive frames say nearly the same, so that a step counts as ``slip_limit_evidence`` of one
+    independent observation, times its ``progress``: motion over compression, by which the old part fades as well.
     """
     gain, kept = tuning.slip_limit_evidence * progress / count, math.exp(-progress / tuning.slip_limit_memory)
     best = -math.inf
@@ -208,18 +218,18 @@ def step_limits(
     surface: tuple[FloatArray, FloatArray, BoolArray, BoolArray],
     noise: tuple[float, bool, bool],
     tuning: Tuning,
-    room: tuple[FloatArray, FloatArray],
+    scratch: tuple[FloatArray, FloatArray],
     memory: Memory,
 ) -> None:
-    """Follow what elements take up, see ``follow_springs``, and fill what slip that lets expect; learn the limits.
+    """Stretch the springs (``follow_springs``), fill the slip that follows (``expect_slip``), and learn the limits.
 
-    ``noise``: deviation of a marker coordinate, m, whether nothing has moved for so long that all stays as it was, and
-    whether measured forces are believed: these say more, and nothing is learnt or expected beside them, nor where
-    elements are hardly pressed in beyond the noise. ``room``: at least [ROOMS, k], and [2, any].
+    ``noise``: deviation of a marker coordinate, m; whether pose and load are held, when all stays as it was; and
+    whether measured forces are believed. These say more: beside them nothing is learnt or expected, nor where elements
+    are hardly pressed in beyond the noise. ``scratch``: at least [SCRATCH_ROWS, k], and [2, COUNT + 1].
     """
     deviation, held, measured = noise
     after, common = memory.elements, memory.common
-    size, (rows, series) = COUNT + 1, room
+    size, (rows, series) = COUNT + 1, scratch
     weights, shown_by = series[0, :size], series[1, :size]
     found = common[LIMIT_LIKELIHOODS : LIMIT_LIKELIHOODS + size]
     limit, count = weigh_limits(found, tuning, weights), len(places)

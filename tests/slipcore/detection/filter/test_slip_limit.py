@@ -58,7 +58,7 @@ class Contact:
         field[0, :, 2] = -self.depths
         motion = AnchorMotion(np.full(count, 0.6 * way), np.full(count, 0.8 * way), np.zeros(count))
         places = np.array([[0, j] for j in range(count)], np.int64).reshape(count, 2)
-        rows = np.zeros((slip_limit.ROOMS, count)), np.zeros((2, 64))
+        rows = np.zeros((slip_limit.SCRATCH_ROWS, count)), np.zeros((2, 64))
         memory = Memory(touch, touch, np.zeros((1, count)), np.zeros(1), after, self.common)
         unwrap(slip_limit.step_limits)(
             self.elements, places, motion, (field, field, touch, touch), (self.noise, held, has_force), self.tuning,
@@ -197,7 +197,7 @@ def test_what_has_just_touched_begins_at_the_depth_before_and_what_does_not_has_
         NOISE,
         10.0,
         after,
-        np.zeros((slip_limit.ROOMS, 1)),
+        np.zeros((slip_limit.SCRATCH_ROWS, 1)),
     )
     assert after[TOUCH_DEPTH, 0].tolist() == [1e-4, 3e-4, 0.0]
     assert after[SPRING_X, 0].tolist() == [1e-4, 0.0, 0.0]
