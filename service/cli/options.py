@@ -16,13 +16,14 @@ METHOD_HELP = f"Estimator: {', '.join(METHODS[:-1])} or {METHODS[-1]}."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
 
 
-def _as_png(path: Path | None) -> Path | None:
+def png_path(path: Path | None) -> Path | None:
+    """The path of a picture, refused where its name is no PNG's; raises ``typer.BadParameter``."""
     if path is not None and path.suffix.lower() != ".png":
         raise typer.BadParameter(f"{path.name}; allowed: a name that ends in .png")
     return path
 
 
-Picture = Annotated[Path | None, typer.Option(callback=_as_png, help="Write a picture of slip over time to this PNG.")]
+Picture = Annotated[Path | None, typer.Option(callback=png_path, help="Write a picture of slip over time to this PNG.")]
 Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pixel.")]
 FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]
 Mapping = Annotated[

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import typer
 
-from service.cli import inputs, local
+from service.cli import inputs, local, options
 from slipcore import ContactFriction, GraspLog, InvalidInput
 from slipcore.forces.reconstruction.comparison import Agreement, ForceComparison
 from tests.service.domain.test_doubtful_logs import MODEL
@@ -20,10 +20,10 @@ Capture = pytest.CaptureFixture[str]
 
 @pytest.mark.parametrize("name", ["slip.png", "slip.PNG"])
 def test_a_picture_has_a_name_of_a_png(name: str) -> None:
-    assert local._as_png(Path(name)) == Path(name)
-    assert local._as_png(None) is None
+    assert options.png_path(Path(name)) == Path(name)
+    assert options.png_path(None) is None
     with pytest.raises(typer.BadParameter, match=r"slip\.svg; allowed: a name that ends in \.png"):
-        local._as_png(Path("there/slip.svg"))
+        options.png_path(Path("there/slip.svg"))
 
 
 def test_nothing_that_is_read_is_written_over_by_whatever_name(tmp_path: Path) -> None:
