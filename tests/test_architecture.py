@@ -185,7 +185,9 @@ def client_parts(path: Path) -> set[str]:
     """The modules of the client that a file uses, by the names of the package as well."""
     import stiction_client
 
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    if "stiction_client" not in (text := path.read_text(encoding="utf-8")):
+        return set()
+    tree = ast.parse(text)
     nodes = [node for node in import_statements(path) if isinstance(node, ast.ImportFrom)]
     names = {alias.name for node in nodes if node.module == "stiction_client" for alias in node.names}
     names |= {

@@ -124,14 +124,14 @@ def test_nor_does_a_long_one_let_a_new_key_overtake_those_whose_short_jobs_were_
         runner = runners.add(session, "host:1")
         add(session, paper, 1 + long_ones_wait, is_long=True)
         assert jobs.claim(session, runner) is not None
-        many = add(session, paper, 60, LARGE)
-        for _ in range(50):
+        many = add(session, paper, 32, LARGE)
+        for _ in range(20):
             claim = jobs.claim(session, runner, only_short=True)
             assert claim is not None
             jobs.finish(session, claim, "done")
         if one_runs:
             assert jobs.claim(session, runner, only_short=True) is not None
-        new = add(session, paper, 20, SMALL)
+        new = add(session, paper, 12, SMALL)
         (long,) = add(session, paper, 1, SMALL, is_long=True)
         done = []
         while claim := jobs.claim(session, runner, only_short=True):

@@ -103,7 +103,7 @@ def test_noise_that_is_smoothed_over_elements_is_known_from_the_sums_of_their_fo
     assert np.median(lows) > 0.25
 
 
-@pytest.mark.parametrize("side", [2, 3, 5, 10])
+@pytest.mark.parametrize("side", [2, pytest.param(3, marks=pytest.mark.long), 5, 10])
 @pytest.mark.parametrize("kind", [lasting, smoothed_lasting, common_lasting])
 def test_noise_that_lasts_over_frames_is_known_from_more_than_three_of_them(kind: Noise, side: int) -> None:
     """As white noise that a filter with a time constant of ten frames leaves of: in half of the logs too large before,
