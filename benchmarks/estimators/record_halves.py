@@ -5,7 +5,9 @@ fitted, each block as a grasp, and the other half is predicted: which part of it
 95 % quantiles of an element. Rocks slide at micrometres a second, for which the priors of slopes are not made: their
 velocities count in millimetres. Of the bench also the second half of each stroke, where the record has left the elastic
 ramp. Beside the methods stand what a normal with the mean and the deviation of the record's own residuals has below the
-same quantiles, and what a prediction has that knows how far the blocks before and after in time are off the law. Writes
+same quantiles, and what a prediction has that knows how far the blocks before and after in time are off the law. Then
+whether levels scatter as a normal or as a log-normal factor: of the rocks' blocks and of the bench's strokes each is
+predicted from all others, by the Student-t of their mean and deviation, and of those of their logarithms. Writes
 record_halves.json.
 """
 
@@ -19,7 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+from scipy import special, stats
 
 import estimators
 from benchmarks.estimators.friction_records import ROCKS, bench, rock
@@ -36,6 +38,10 @@ COLUMNS = (
     "the right normal",
     "by blocks beside in time",
 )
+
+SHAPE_COLUMNS = ("record", "levels", "deviation, % of friction", "log score of a log-normal factor over a normal one")
+LEAST_STROKE = 30
+"""Samples; less is a part of a stroke."""
 
 
 def records() -> dict[str, FrictionSamples]:
@@ -86,6 +92,39 @@ def beside(parts: Sequence[FrictionSamples], chosen: NDArray[np.bool_]) -> list[
     return [float((left < score * scatter).mean()) for score in special.ndtri(QUANTILES)]
 
 
+def strokes_of(record: FrictionSamples) -> list[FrictionSamples]:
+    """Of the bench: what lies between two reversals, where samples are left out."""
+    order = np.argsort(record.time, kind="stable")
+    ends = np.flatnonzero(np.diff(record.time[order]) > 2.5 * np.median(np.diff(record.time[order]))) + 1
+    parts = [part for part in np.split(order, ends) if len(part) >= LEAST_STROKE]
+    return [record.take(np.isin(np.arange(len(record)), part)) for part in parts]
+
+
+def factors(parts: Sequence[FrictionSamples]) -> NDArray[np.float64]:
+    """Mean friction of each part over what a law that is fitted to all expects of it."""
+    model = estimators.fit(parts, method="hierarchical")
+    expected = [model.predict(part.tangential_velocity, part.normal_force).mean() for part in parts]
+    return np.array([part.friction_coefficient.mean() for part in parts]) / np.array(expected)
+
+
+def left_out_scores(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log density of each value by the Student-t of the mean and the deviation of all others."""
+    found = np.empty(len(values))
+    for k, value in enumerate(values):
+        others = np.delete(values, k)
+        spread = others.std(ddof=1) * np.sqrt(1.0 + 1.0 / len(others))
+        found[k] = stats.t.logpdf(value, len(others) - 1, others.mean(), spread)
+    return found
+
+
+def shape_row(name: str, record: FrictionSamples) -> list[object]:
+    """Whether the levels of one record say how they scatter: the sum of the scores' differences, and its error."""
+    levels = factors(strokes_of(record) if "bench" in name else blocks_of(record, BLOCKS))
+    better = left_out_scores(np.log(levels)) - np.log(levels) - left_out_scores(levels)
+    told = f"{better.sum():+.2f} ± {better.std() * np.sqrt(len(better)):.2f}"
+    return [name, len(levels), f"{100.0 * levels.std(ddof=1) / levels.mean():.2f}", told]
+
+
 def row(name: str, record: FrictionSamples, halves: int) -> list[object]:
     """Means over random halves of one record, by each method."""
     rng, parts = np.random.default_rng(0), blocks_of(record, BLOCKS)
@@ -102,9 +141,12 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     rows = [row(name, record, arguments.halves) for name, record in records().items()]
-    tables = {"record halves": table(COLUMNS, rows)}
-    print(tables["record halves"])
-    write([dict(zip(COLUMNS, each, strict=True)) for each in rows], tables, arguments, "record_halves.json")
+    shapes = [shape_row(name, record) for name, record in records().items()]
+    tables = {"record halves": table(COLUMNS, rows), "record shapes": table(SHAPE_COLUMNS, shapes)}
+    print(*tables.values(), sep="\n\n")
+    found = [dict(zip(COLUMNS, each, strict=True)) for each in rows]
+    found += [dict(zip(SHAPE_COLUMNS, each, strict=True)) for each in shapes]
+    write(found, tables, arguments, "record_halves.json")
 
 
 if __name__ == "__main__":

@@ -37,7 +37,9 @@ CONTACT, WORKING_POINT = 60, (1e-3, 0.12)
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Scales of the scatter; ``smooth``: over how many elements places go together; ``heavy``: Student-t samples."""
+    """Scales of the scatter; ``smooth``: over how many elements places go together; ``heavy``: Student-t samples;
+    ``normal``: what grasps scale friction by is normal, not log-normal.
+    """
 
     between_grasps: float = 0.0
     between_places: float = 0.0
@@ -45,6 +47,7 @@ class Kind:
     smooth: float = 0.0
     heavy: bool = False
     force_noise: float = 0.0
+    normal: bool = False
 
 
 KINDS = {
@@ -80,7 +83,9 @@ def grasp(kind: Kind, rng: np.random.Generator) -> FrictionSamples:
 
 
 def factor(kind: Kind, score: np.ndarray | float) -> np.ndarray:
-    """Log-normal factor of mean 1 between grasps."""
+    """Factor of mean 1 between grasps, log-normal unless the kind is of a normal one, which is not below 0."""
+    if kind.normal:
+        return np.maximum(1.0 + kind.between_grasps * np.asarray(score), 0.0)
     spread = np.sqrt(np.log1p(kind.between_grasps**2))
     return np.exp(spread * np.asarray(score) - 0.5 * spread**2)
 

@@ -9,6 +9,9 @@ an answer once given stays until its probability of slip is twice that asked for
 Counted: loads answered by one, two and three logs; how often a new grasp slips under answers of one, two, three and
 five, over what was asked; answers that vanish with the second log, with the third to fifth, and with the sixth to
 twentieth; steps in which any of a material's loads loses its answer. Writes answers_kept.json.
+
+`--shapes`: instead, both factors in the model, in worlds of either: what it costs to take one for the other. Writes
+answers_of_shapes.json.
 """
 
 import os
@@ -61,6 +64,16 @@ COLUMNS = (
     "vanish with log 2, 3 to 5, 6 to 20, %",
     "of all, %",
     "steps with one, %",
+)
+SHAPES: tuple[tuple[str, float | None], ...] = (("normal", None), ("log-normal", WIDER))
+"""Factors of the model, and the scale of its prior where it is not the default."""
+GROWN = (1, 2, 3, 5, 10, 20)
+SHAPE_COLUMNS = (
+    "factor of the world",
+    "of the model",
+    "answered by 2 logs, %",
+    "steps with one lost, %",
+    *(f"slips at {asked:g} by {', '.join(map(str, GROWN))} logs, over asked" for asked in ASKED),
 )
 
 
@@ -168,6 +181,49 @@ def row(rule: tuple[str, str], median: str, found: Sequence[Followed]) -> list[o
     ]
 
 
+def of_shapes(seed: int, median: float, *, normal: bool) -> list[tuple[NDArray[np.bool_], Array]]:
+    """One material of a world, log by log, by each of ``SHAPES``: where there are answers, [logs, loads], and how often
+    a new grasp slips over what was asked, [asked, ``GROWN``], by the answers of so many logs.
+    """
+    kind, logs, least = material(seed, median, COUNT, normal=normal)
+    loads = {asked: np.array([load_of(kind, float(force), asked) for force in least]) for asked in ASKED}
+    found = []
+    for factor, scale in SHAPES:
+        models = growing(logs, ScatterPrior() if scale is None else ScatterPrior(scale=scale))
+        models = models if factor == "normal" else [*map(PositiveFactor.of, models)]
+        forces = {asked: told(models, each, asked) for asked, each in loads.items()}
+        slipped = [[_mean_slip(kind, loads[asked], forces[asked][k - 1], asked) for k in GROWN] for asked in ASKED]
+        found.append((np.isfinite(forces[ASKED[0]]), np.array(slipped)))
+    return found
+
+
+def _mean_slip(kind: Kind, loads: Array, forces: Array, asked: float) -> float:
+    """How often a new grasp slips over what was asked, of the loads that got an answer; NaN where none did."""
+    cases = zip(loads.tolist(), forces.tolist(), strict=True)
+    slipped = [slips(kind, load, force) / asked for load, force in cases if np.isfinite(force)]
+    return float(np.mean(slipped)) if slipped else np.nan
+
+
+def shape_rows(seeds: Sequence[int]) -> list[list[object]]:
+    """Lines of the table of both worlds."""
+    rows = list[list[object]]()
+    for normal in (False, True):
+        cases = [of_shapes(seed, median, normal=normal) for median in MEDIANS for seed in seeds]
+        for (factor, scale), found in zip(SHAPES, zip(*cases, strict=True), strict=True):
+            answered, slipped = np.stack([each[0] for each in found]), np.nanmean([each[1] for each in found], axis=0)
+            lost = answered[:, :-1] & ~answered[:, 1:]
+            rows.append(
+                [
+                    "normal" if normal else "log-normal",
+                    factor if scale is None else f"{factor}, scale {scale:g}",
+                    f"{100.0 * answered[:, 1].mean():.1f}",
+                    f"{100.0 * lost.any(axis=2).mean():.2f}",
+                    *(" ".join(f"{slip:.2f}" for slip in each) for each in slipped),
+                ]
+            )
+    return rows
+
+
 def _share(some: NDArray[np.bool_], of: NDArray[np.bool_]) -> str:
     return f"{100.0 * some.sum() / of.sum():.2f}"
 
@@ -177,9 +233,15 @@ def main() -> None:
     parser = options(__doc__)
     parser.add_argument("--materials", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--shapes", action="store_true", help="both factors, in worlds of either")
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     seeds = range(arguments.seed, arguments.seed + arguments.materials)
+    if arguments.shapes:
+        rows = shape_rows(seeds)
+        print(table(SHAPE_COLUMNS, rows))
+        write([dict(zip(SHAPE_COLUMNS, each, strict=True)) for each in rows], {}, arguments, "answers_of_shapes.json")
+        return
     found: dict[str, list[list[Followed]]] = {}
     for median in MEDIANS:
         others = recorded(median, np.random.default_rng([arguments.seed, round(1e6 * median)]))[:OTHERS]

@@ -19,7 +19,7 @@ os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is first imported: small pro
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import product
 from typing import NamedTuple
 
@@ -85,10 +85,15 @@ def of_planner(found: FittedModel) -> FrictionModel:
     return FrictionModel(**told, material="new", version=1)
 
 
-def material(seed: int, median: float, count: int) -> tuple[Kind, list[Moments], NDArray[np.float64]]:
-    """One of a population, so many logs of it, and the forces, N, that hold its loads in the hand of who knows all."""
+def material(
+    seed: int, median: float, count: int, *, normal: bool = False
+) -> tuple[Kind, list[Moments], NDArray[np.float64]]:
+    """One of a population, so many logs of it, and the forces, N, that hold its loads in the hand of who knows all.
+
+    ``normal``: what its grasps scale friction by is normal, in place of log-normal.
+    """
     rng = np.random.default_rng([seed, round(1e6 * median)])
-    kind = scatters(drawn(median, rng))
+    kind = replace(scatters(drawn(median, rng)), normal=normal)
     logs = [Moments.from_samples(grasp(kind, rng)) for _ in range(count)]
     return kind, logs, rng.uniform(*FORCES, LOADS)
 

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from benchmarks.estimators.friction_records import DATA, bench, samples_of
-from benchmarks.estimators.record_halves import QUANTILES, below, beside, blocks_of, right_normal
+from benchmarks.estimators.record_halves import (
+    QUANTILES,
+    below,
+    beside,
+    blocks_of,
+    factors,
+    left_out_scores,
+    right_normal,
+    strokes_of,
+)
 
 
 def test_the_quantiles_of_a_record_of_independent_errors_hold_what_they_say() -> None:
@@ -39,3 +48,19 @@ def test_the_second_half_of_a_stroke_has_left_the_ramp() -> None:
     assert 0.35 * len(whole) < len(part) < 0.55 * len(whole)
     assert np.quantile(whole, 0.05) < 0.1
     assert np.quantile(part, 0.05) > 0.42
+
+
+def test_strokes_end_where_samples_are_left_out_and_have_a_factor_each() -> None:
+    rng, time = np.random.default_rng(0), np.concatenate([start + np.arange(50) / 200.0 for start in range(4)])
+    v, f_n, scale = rng.uniform(1e-3, 2e-3, 200), rng.uniform(4.0, 6.0, 200), np.repeat([0.9, 1.0, 1.1, 1.0], 50)
+    record = samples_of(time, v, f_n, 0.5 * scale)
+    assert [len(part) for part in strokes_of(record)] == [50] * 4
+    assert len(strokes_of(record.take(time < 3.1))) == 3  # 20 samples are a part of a stroke
+    assert factors(strokes_of(record)) == pytest.approx([0.9, 1.0, 1.1, 1.0], abs=0.03)
+
+
+def test_a_score_left_out_is_of_the_others_alone() -> None:
+    values = np.append(np.random.default_rng(0).standard_normal(50), 8.0)
+    scores = left_out_scores(values)
+    assert scores[-1] == scores.min() < -20.0
+    assert np.median(scores) == pytest.approx(-1.2, abs=0.3)  # of a normal density ln √(2πe) less a half, about

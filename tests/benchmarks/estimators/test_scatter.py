@@ -51,3 +51,12 @@ def test_a_cell_tells_every_method() -> None:
     assert [row["method"] for row in rows] == ["ols", "hierarchical", "bayes", "auto"]
     for row in rows:
         assert np.isfinite([*row["covered"], *row["width"], *row["achieved_over_asked"]]).all()
+
+
+def test_a_normal_factor_has_the_deviation_of_a_log_normal_one_and_is_not_below_0() -> None:
+    score = np.random.default_rng(0).standard_normal(200_000)
+    for normal in (False, True):
+        found = factor(Kind(0.2, normal=normal), score)
+        assert found.mean() == pytest.approx(1.0, abs=0.002), normal
+        assert found.std() == pytest.approx(0.2, rel=0.01), normal
+    assert factor(Kind(0.2, normal=True), -6.0) == 0.0

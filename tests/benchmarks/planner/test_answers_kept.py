@@ -8,8 +8,17 @@ from scipy.stats import lognorm
 
 from benchmarks.estimators.population import scatters
 from benchmarks.estimators.scatter import CONTACT, grasp
-from benchmarks.planner.answers_kept import Followed, LogNormalScatter, PositiveFactor, kept, row
-from benchmarks.planner.planned_force import model_of
+from benchmarks.planner.answers_kept import (
+    GROWN,
+    SHAPES,
+    Followed,
+    LogNormalScatter,
+    PositiveFactor,
+    kept,
+    of_shapes,
+    row,
+)
+from benchmarks.planner.planned_force import ASKED, model_of
 from estimators import Moments, ScatterPrior
 from stiction_client import FrictionModel
 from stiction_client.linear_friction import Scale
@@ -65,3 +74,11 @@ def test_a_line_counts_answers_and_those_that_vanish() -> None:
     told = row(("normal", "default"), "0.05", [Followed(scatters(0.05), loads, forces)])
     assert told[:4] == ["normal", "default", "0.05", "100.0 50.0 100.0"]
     assert told[5:] == ["50.00 0.00 7.14", "8.57", "10.53"]
+
+
+def test_in_a_normal_world_a_log_normal_factor_lets_more_slip() -> None:
+    normal, log_normal = of_shapes(8000, 0.12, normal=True)
+    assert normal[0].shape == log_normal[0].shape == (20, 20)
+    assert normal[1].shape == log_normal[1].shape == (len(ASKED), len(GROWN))
+    assert (log_normal[1][:, -1] > normal[1][:, -1]).all()
+    assert len(SHAPES) == 2

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from estimators import ScatterPrior
+import estimators
+from benchmarks.estimators import scatter
+from estimators import Moments, ScatterPrior
+from estimators.linear.fit_data import gather
 from estimators.linear.mixture_summary import _half_width, scatter_alone, summarise
-from estimators.linear.normal_mixture import matched_student
-from estimators.linear.posterior_grid import ScaleNodes
+from estimators.linear.normal_mixture import matched_student, mixture_quantile
+from estimators.linear.posterior_grid import ScaleNodes, posterior_grid
 
 AT = np.array([1.0, 2e-3, 0.1])
 TAU = np.array([0.02, 0.05, 0.1, 0.2])
@@ -60,3 +63,19 @@ def test_scatter_alone_has_the_other_materials_taken_out() -> None:
     found = scatter_alone(nodes(weights(other)), other)
     expected = matched_student(weights(ScatterPrior()), np.zeros(4), TAU)
     assert (found.value, found.degrees_of_freedom) == pytest.approx(tuple(expected), rel=1e-9)
+
+
+@pytest.mark.parametrize(("grasps", "near"), [(1, 0.015), (2, 0.01), (5, 0.003)])
+def test_what_a_contact_slips_below_is_that_of_the_mixture(grasps: int, near: float) -> None:
+    """In parts of friction, at a planner's 1e-2: Student's distributions of which it is made cost no answers."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        kind = scatter.KINDS["grasp and place"]
+        logs = [Moments.from_samples(scatter.grasp(kind, rng)) for _ in range(grasps)]
+        told = estimators.fit(logs, "hierarchical").predict(*scatter.WORKING_POINT, 1e-2, "contact", scatter.CONTACT)
+        found, at = posterior_grid(gather(logs)).nodes, np.array([1.0, *scatter.WORKING_POINT])
+        sigma, tau, omega = found.scatter.T
+        mean, uncertain = found.mean @ at, np.einsum("kij,i,j->k", found.covariance, at, at)
+        spread = np.sqrt(uncertain + (tau * mean) ** 2 + (omega**2 + sigma**2) / scatter.CONTACT)
+        exact = mixture_quantile(found.weight, mean, spread, 1e-2)[0]
+        assert told / (found.weight @ mean) == pytest.approx(exact / (found.weight @ mean), abs=near)
