@@ -15,13 +15,14 @@ from service.domain import keys
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.http import access, errors, openapi
-from service.http.authentication import Authentication, Authenticator
 from service.http.context import ServerContext
-from service.http.fair_starts import FairStarts
-from service.http.head_requests import HeadRequests
-from service.http.lookups import Lookups
-from service.http.own_cookie import OwnCookie
-from service.http.request_middleware import RequestMiddleware
+from service.http.middleware.authentication import Authentication, Authenticator
+from service.http.middleware.fair_starts import FairStarts
+from service.http.middleware.head_requests import HeadRequests
+from service.http.middleware.lookups import Lookups
+from service.http.middleware.own_cookie import OwnCookie
+from service.http.middleware.request_middleware import RequestMiddleware
+from service.http.middleware.start_refusal import StartRefusal
 from service.http.routes import (
     audit,
     curation,
@@ -35,7 +36,6 @@ from service.http.routes import (
     sensors,
     stream,
 )
-from service.http.start_refusal import StartRefusal
 from service.jobs.executors import executor_for_short_jobs, executors
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner

@@ -10,9 +10,9 @@ from typing import Any
 import uvicorn
 
 from service.app import create_app
-from service.http.connections import BoundedConnection, H11Connection
-from service.http.request_middleware import MOST_HEADER_BYTES
-from service.http.websockets import WebSocketConnection
+from service.http.middleware.request_middleware import MOST_HEADER_BYTES
+from service.http.protocol.connections import BoundedConnection, H11Connection
+from service.http.protocol.websockets import WebSocketConnection
 from service.processes import limits
 from service.settings import Settings
 
@@ -87,6 +87,6 @@ def parsed_connection() -> type[BoundedConnection]:
     """Connections read by httptools, which takes a third of the time, or by h11 where that is not installed."""
     if importlib.util.find_spec("httptools") is None:
         return H11Connection
-    from service.http.httptools_connections import HttpToolsConnection
+    from service.http.protocol.httptools_connections import HttpToolsConnection
 
     return HttpToolsConnection

@@ -11,7 +11,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
 
-from service.http.head_requests import IS_HEAD
+IS_HEAD = "stiction.is_head"
+"""Key in the scope of a HEAD request that is handed on as GET (``middleware.head_requests``)."""
 
 CHECKED_SECONDS = 60.0
 """s after which a file of which parts are asked for is compared with its hash anew."""

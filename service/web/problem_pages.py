@@ -11,8 +11,8 @@ from fastapi import Request
 from fastapi.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.http.middleware.request_middleware import with_common_headers
 from service.http.problems import MEDIA_TYPE
-from service.http.request_middleware import with_common_headers
 from service.web.rendering import render
 
 KEPT_HEADERS = frozenset({b"retry-after", b"www-authenticate", b"allow", b"x-request-id"})

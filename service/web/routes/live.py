@@ -6,8 +6,8 @@ from fastapi import APIRouter, Request, Response, WebSocket
 from starlette.exceptions import HTTPException
 
 from service.http.access import READ, principal
-from service.http.authentication import Authenticator
 from service.http.context import ServerContext
+from service.http.middleware.authentication import Authenticator
 from service.stream import watching
 from service.web.rendering import render
 

@@ -8,8 +8,8 @@ from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
 from service.http import origin, sessions
-from service.http.authentication import Authenticator
 from service.http.dependencies import CurrentContext
+from service.http.middleware.authentication import Authenticator
 from service.web.forms import FormRoute
 from service.web.rendering import on_problem, render
 

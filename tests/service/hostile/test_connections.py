@@ -12,11 +12,11 @@ import httpx
 import pytest
 
 from service import serving as server
-from service.http import connections, turns
-from service.http.connections import BoundedConnection, H11Connection
-from service.http.httptools_connections import HttpToolsConnection
-from service.http.request_middleware import MOST_HEADER_BYTES
-from service.http.websockets import MOST_FRAGMENTS, PARSED_BYTES, WebSocketConnection
+from service.http.middleware.request_middleware import MOST_HEADER_BYTES
+from service.http.protocol import connections, turns
+from service.http.protocol.connections import BoundedConnection, H11Connection
+from service.http.protocol.httptools_connections import HttpToolsConnection
+from service.http.protocol.websockets import MOST_FRAGMENTS, PARSED_BYTES, WebSocketConnection
 from service.settings import Settings
 
 MOST_OF_ONE = 20

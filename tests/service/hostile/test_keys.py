@@ -22,7 +22,7 @@ from service import cli
 from service.cli.durations import moment_to_come
 from service.domain import keys
 from service.domain.keys import NoKeys, check_start
-from service.http import authentication
+from service.http.middleware import authentication
 from service.settings import Settings
 
 Reach = Callable[..., Any]

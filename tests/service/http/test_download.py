@@ -10,8 +10,8 @@ from fastapi import FastAPI, Request
 
 from service.http import errors
 from service.http.download import Download, checked_within
-from service.http.head_requests import HeadRequests
-from service.http.request_middleware import RequestMiddleware
+from service.http.middleware.head_requests import HeadRequests
+from service.http.middleware.request_middleware import RequestMiddleware
 
 CONTENT = bytes(range(100))
 

@@ -14,8 +14,8 @@ from db.records import NewGraspLog
 from db.repositories import access_keys, grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
 from service.domain import keys
-from service.http import authentication
 from service.http.idempotency import IdempotencyKey, RepeatableResponse, respond_once
+from service.http.middleware import authentication
 from tests.forking import Context
 
 Reach = Callable[..., Any]

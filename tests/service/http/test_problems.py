@@ -8,8 +8,8 @@ from fastapi import FastAPI
 
 from db.errors import NotFound, StorageUnavailable
 from service.http import errors, problems
+from service.http.middleware.request_middleware import RequestMiddleware
 from service.http.problems import PROBLEM_TYPES, Problem
-from service.http.request_middleware import RequestMiddleware
 
 DOCUMENTED = dict(
     re.findall(r"^\| `/problems/([\w-]+)` \| (\d+)", (Path(__file__).parents[3] / "docs/problems.md").read_text(), re.M)

@@ -9,7 +9,7 @@ import pytest
 from starlette.middleware.exceptions import ExceptionMiddleware
 from starlette.types import Message, Receive, Scope, Send
 
-from service.http.request_middleware import BODY_SECONDS, SLOWEST_BODY, RequestMiddleware
+from service.http.middleware.request_middleware import BODY_SECONDS, SLOWEST_BODY, RequestMiddleware
 
 SECOND_EARNED = b"x" * int(SLOWEST_BODY)
 SCOPE = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": [], "scheme": "http"}

@@ -11,7 +11,8 @@ from starlette.requests import cookie_parser
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
 from service.domain import keys
-from service.http import authentication, sessions
+from service.http import sessions
+from service.http.middleware import authentication
 from tests.service.web.conftest import HTML
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)

@@ -8,7 +8,7 @@ import pytest
 
 from db.errors import StorageUnavailable
 from service.domain.keys import NoKeys
-from service.http.start_refusal import StartRefusal
+from service.http.middleware.start_refusal import StartRefusal
 
 
 def said(error: Exception | None, scope_type: str = "lifespan", kind: str = "lifespan.startup.failed") -> list[Any]:

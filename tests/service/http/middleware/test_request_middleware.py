@@ -7,8 +7,8 @@ import pytest
 from fastapi import APIRouter
 from fastapi.responses import HTMLResponse
 
-from service.http import request_middleware
 from service.http.access import READ
+from service.http.middleware import request_middleware
 from service.observability.logs import ABOUT
 
 Reach = Any

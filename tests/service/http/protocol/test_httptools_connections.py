@@ -11,7 +11,7 @@ import uvicorn
 from starlette.types import Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from service.http.httptools_connections import HEAD_BYTES, HttpToolsConnection
+from service.http.protocol.httptools_connections import HEAD_BYTES, HttpToolsConnection
 
 MOST = 400
 """Bytes of headers that are kept of a request."""
@@ -132,7 +132,7 @@ def test_a_body_is_parsed_at_once_and_all_else_a_kilobyte_at_a_time(monkeypatch:
     monkeypatch.setattr(HttpToolsProtocol, "data_received", look)
     head = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 5000\r\nX: 1\r\n\r\n"
     head = head.replace(b"1\r\n\r\n", (HEAD_BYTES - len(head) + 1) * b"1" + b"\r\n\r\n")
-    monkeypatch.setattr("tests.service.http.test_httptools_connections.MOST", 2 * HEAD_BYTES)
+    monkeypatch.setattr("tests.service.http.protocol.test_httptools_connections.MOST", 2 * HEAD_BYTES)
     asked, _ = exchange(head, 2000 * b"b", 3000 * b"b" + BEGIN + b"\r\n\r\n")
     assert [len(body) for _, body in asked] == [5000, 0]
     assert parsed == [HEAD_BYTES, 2000, 3000, len(BEGIN) + 4]

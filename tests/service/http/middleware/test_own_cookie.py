@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from service.http.head_requests import IS_HEAD, HeadRequests
-from service.http.own_cookie import OwnCookie
+from service.http.middleware.head_requests import IS_HEAD, HeadRequests
+from service.http.middleware.own_cookie import OwnCookie
 from service.http.sessions import COOKIE
 
 Headers = list[tuple[bytes, bytes]]

@@ -16,16 +16,16 @@ from service.domain.context import Context
 from service.domain.errors import NoModel
 from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
-from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
-from service.http.parameters import numbers_among, wrong_parameter
-from service.http.request_middleware import (
+from service.http.middleware.authentication import Authenticator
+from service.http.middleware.request_middleware import (
     Headers,
     id_header,
     request_id_of,
     size_of_headers,
     with_common_headers,
 )
+from service.http.parameters import numbers_among, wrong_parameter
 from service.http.schemas.models import FrictionOut, LookUpQuery
 from service.observability import traces
 from service.observability.access_log import AccessLog

@@ -12,8 +12,8 @@ from typing import cast
 
 import pytest
 
-from service.http import joined_writes
-from service.http.joined_writes import JoinedWrites
+from service.http.protocol import joined_writes
+from service.http.protocol.joined_writes import JoinedWrites
 from tests.waiting import wait_until
 
 

@@ -9,7 +9,7 @@ import pytest
 import uvicorn
 from uvicorn.protocols.utils import ClientDisconnected
 
-from service.http.websockets import MOST_FRAGMENTS, MOST_UNSENT_BYTES, PARSED_BYTES, WebSocketConnection
+from service.http.protocol.websockets import MOST_FRAGMENTS, MOST_UNSENT_BYTES, PARSED_BYTES, WebSocketConnection
 
 HANDSHAKE = (
     b"GET /live HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"

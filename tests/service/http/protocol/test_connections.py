@@ -18,10 +18,10 @@ import pytest
 import uvicorn
 from starlette.types import Receive, Scope, Send
 
-from service.http import connections, joined_writes, turns
-from service.http.connections import BoundedConnection, H11Connection
-from service.http.httptools_connections import HttpToolsConnection
-from service.http.request_middleware import MOST_HEADER_BYTES
+from service.http.middleware.request_middleware import MOST_HEADER_BYTES
+from service.http.protocol import connections, joined_writes, turns
+from service.http.protocol.connections import BoundedConnection, H11Connection
+from service.http.protocol.httptools_connections import HttpToolsConnection
 
 TIMEOUT = 0.2
 MOST, MOST_OF_ONE = 60, 100

@@ -10,8 +10,8 @@ import pytest
 from starlette.requests import HTTPConnection
 from starlette.types import Message, Receive, Scope, Send
 
-from service.http.authentication import Authenticator
-from service.http.fair_starts import FairStarts
+from service.http.middleware.authentication import Authenticator
+from service.http.middleware.fair_starts import FairStarts
 from service.settings import Settings
 
 
@@ -72,7 +72,7 @@ def test_who_has_a_key_does_not_wait_for_others_at_the_same_address() -> None:
 
 def test_a_round_that_lasts_longer_than_the_time_to_wait_begins_no_second_one(monkeypatch: pytest.MonkeyPatch) -> None:
     seconds = count(step=60.0)
-    monkeypatch.setattr("service.http.fair_starts.time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    monkeypatch.setattr("service.http.middleware.fair_starts.time", SimpleNamespace(monotonic=lambda: next(seconds)))
     assert begun("aaa") == ["a"] * 3
 
 

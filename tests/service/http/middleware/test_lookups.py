@@ -9,8 +9,8 @@ from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
 from service.domain import keys
 from service.domain.model_cache import ModelCache
-from service.http import lookups
-from service.http.lookups import Lookups
+from service.http.middleware import lookups
+from service.http.middleware.lookups import Lookups
 from service.http.routes import materials as route
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)

@@ -1,9 +1,9 @@
 """HTTP connections that cannot be kept waiting, whichever parser reads them.
 
 Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. Who sends much
-waits for the others (``service.http.turns``). No address may hold all connections, and those that ask nothing make
-room for others. Who sends requests without waiting for answers is read no faster than he is answered, and a request
-that two parsers could read differently is refused.
+waits for the others (``turns``). No address may hold all connections, and those that ask nothing make room for others.
+Who sends requests without waiting for answers is read no faster than he is answered, and a request that two parsers
+could read differently is refused.
 """
 
 import asyncio
@@ -20,9 +20,9 @@ from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.domain.networks import network_of
-from service.http import turns
-from service.http.joined_writes import JoinedWrites
 from service.http.problems import BAD_REQUEST, HEADERS_TOO_LARGE, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
+from service.http.protocol import turns
+from service.http.protocol.joined_writes import JoinedWrites
 
 HEADER_SECONDS = 10.0
 """s from the first byte of a request, or from the connection, to the end of its headers.

@@ -15,7 +15,8 @@ from db.repositories import access_keys
 from service.app import create_app
 from service.domain import keys
 from service.domain.keys import SCOPES, NoKeys, check_start
-from service.http import access, authentication
+from service.http import access
+from service.http.middleware import authentication
 from service.settings import Settings
 from service.web.routes import practice
 from stiction_client import AsyncFrictionClient, Material, ProblemError

@@ -8,9 +8,9 @@ from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
-from service.http import turns
 from service.http.bodies import is_utf_8
-from service.http.joined_writes import JoinedWrites
+from service.http.protocol import turns
+from service.http.protocol.joined_writes import JoinedWrites
 
 MOST_UNSENT_BYTES = 2**20
 """Of answers to pings that a client does not read; the application waits from 64 KiB on."""

@@ -5,7 +5,7 @@ from typing import Any
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from service.http.connections import BoundedConnection
+from service.http.protocol.connections import BoundedConnection
 
 OFFER = frozenset({b"upgrade", b"http2-settings"})
 """Headers of an offer to speak another protocol from here on, and what ``Connection`` says of them (RFC 9110, 7.8)."""

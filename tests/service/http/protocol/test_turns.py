@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from itertools import groupby
 
-from service.http.turns import Turns, turns_of
+from service.http.protocol.turns import Turns, turns_of
 
 
 def test_connections_take_turns_and_all_else_runs_between_them() -> None:

@@ -2,8 +2,7 @@
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-IS_HEAD = "stiction.is_head"
-"""In the scope of a request that is handed on as GET."""
+from service.http.download import IS_HEAD
 
 
 class HeadRequests:

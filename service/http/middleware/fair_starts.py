@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.http.authentication import Authenticator
+from service.http.middleware.authentication import Authenticator
 from service.processes.fair_queue import UnboundedFairQueue
 
 START_SECONDS = 0.001
