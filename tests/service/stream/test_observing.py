@@ -1,6 +1,7 @@
 """What a grip controller is told of a frame, of few elements by hand."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,11 @@ import pytest
 from service.stream.observing import LEAST_SPEED, WINDOW, Observer
 from slipcore import Frame, SlipState
 
-GRID = (1, 3)
-PLACE = np.array([[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0], [0.002, 0.0, 0.0]]])
-FORCE = np.array([[[0.3, 0.0, -1.0], [0.0, 0.4, -2.0], [5.0, 5.0, -9.0]]])
-"""Of which the third does not touch."""
-TOUCH = np.array([[True, True, False]])
+GRID = (1, 4)
+PLACE = np.array([[[0.001 * k, 0.0, 0.0] for k in range(4)]])
+FORCE = np.array([[[0.3, 0.0, -1.0], [0.0, 0.4, -2.0], [0.0, 0.0, 0.0], [5.0, 5.0, -9.0]]])
+"""Of which the third, beside the contact, bears nothing, and the fourth does not touch."""
+TOUCH = np.array([[True, True, False, False]])
 NO = np.zeros(GRID, bool)
 
 
@@ -82,7 +83,7 @@ def test_one_frame_without_slip_begins_the_count_anew() -> None:
 
 
 def test_what_is_slower_than_noise_is_not_sampled_and_tells_how_much_moves() -> None:
-    found = sampled(TOUCH, [[LEAST_SPEED, 1.01 * LEAST_SPEED, 1.0]])
+    found = sampled(TOUCH, [[LEAST_SPEED, 1.01 * LEAST_SPEED, 1.0, 1.0]])
     np.testing.assert_allclose(found.normal_force, [2.0])
     assert found.moving == 0.5
     assert sampled(TOUCH, LEAST_SPEED) is None
@@ -101,7 +102,7 @@ def test_the_speed_that_counts_is_the_mean_of_the_last_frames() -> None:
 
 
 def test_an_element_whose_velocity_is_unknown_is_not_sampled() -> None:
-    np.testing.assert_allclose(sampled(TOUCH, [[np.nan, 1e-3, np.nan]]).normal_force, [2.0])
+    np.testing.assert_allclose(sampled(TOUCH, [[np.nan, 1e-3, np.nan, np.nan]]).normal_force, [2.0])
 
 
 @pytest.mark.parametrize(("pressing", "count"), [(0.2, 1), (0.2001, 2)])
@@ -125,3 +126,29 @@ def test_an_observer_stays_as_it_is() -> None:
     before = Observer(PLACE)
     after, _ = before.step(frame(), state())
     assert (before.last, len(after.last)) == ((), 1)
+
+
+def test_what_the_rim_bears_beside_the_contact_counts_as_load_but_not_as_slip() -> None:
+    """An element that the edge of the contact cuts is pressed too little to count as in contact (the third here)."""
+    cut = FORCE.copy()
+    cut[0, 2] = [0.1, 0.0, -0.5]
+    _, seen = Observer(PLACE).step(frame(cut), state())
+    assert seen.normal == pytest.approx(3.5)
+    assert seen.tangential == pytest.approx(math.hypot(0.4, 0.4))
+    np.testing.assert_allclose(sampled(TOUCH, 1e-3, cut).normal_force, [1.0, 2.0])
+    upright = PLACE.reshape(4, 1, 3)
+    turned = replace(state(), contact=TOUCH.reshape(4, 1), slip=NO.reshape(4, 1), velocity=np.zeros((4, 1, 2)))
+    _, seen = Observer(upright).step(frame()._replace(force=cut.reshape(4, 1, 3)), turned)
+    assert seen.normal == pytest.approx(3.5)
+
+
+def test_the_rim_adds_its_mean_over_some_frames_so_that_its_noise_hardly_counts() -> None:
+    observer, told = Observer(PLACE), []
+    for k in range(20 * WINDOW):
+        noisy = FORCE.copy()
+        noisy[0, 2] = [0.0, 0.0, -0.5 + (0.1 if k % 2 else -0.1)]
+        observer, seen = observer.step(frame(noisy), state())
+        told.append(seen.normal)
+    np.testing.assert_allclose(told[WINDOW:], 3.5, atol=0.1 / WINDOW)
+    away = replace(state(), contact=NO)
+    assert observer.step(frame(noisy), away)[1].normal == 0.0  # nothing touches, so that nothing is beside it
