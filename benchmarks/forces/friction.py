@@ -37,7 +37,7 @@ WITH_DEPTH, IN_PLANE = "with z", "in the plane"
 FIDELITY = Fidelity(cells=40, substeps=1, tolerance=1e-5)
 PRESS, STILL, TRAVEL = 0.25, 0.1, 1.6e-3
 """s of pressing and of rest after it, and m by which the object is then drawn aside within 1.2 s."""
-OF_A_MATERIAL, MATERIALS = 5, 100
+OF_A_MATERIAL, MATERIALS = 5, 200
 SLACK = 0.005
 """F1 by which two detections may differ without one being worse."""
 
@@ -155,15 +155,28 @@ def materials(own: Sequence[Outcome]) -> tuple[FloatArray, BoolArray]:
     """β₀ and the level [k, 2] of materials of a few of these grasps each, where they have samples, and whether their
     intervals of 95 % hold the true friction.
     """
-    told = [Moments.from_bytes(base64.b64decode(each.moments)) for each in own if each.moments]
+    told = [each for each in own if each.moments]
     if len(told) < OF_A_MATERIAL:
         return np.empty((0, 2)), np.empty((0, 2), dtype=bool)
-    rng = np.random.default_rng(95)
-    chosen = [rng.choice(len(told), OF_A_MATERIAL, replace=False) for _ in range(MATERIALS)]
-    found, half = np.array(
-        [intercept_and_level(fit([told[k] for k in each], method="hierarchical")) for each in chosen]
-    ).swapaxes(0, 1)
+    rng, models = np.random.default_rng(95), []
+    for _ in range(MATERIALS):
+        chosen = rng.choice(len(told), OF_A_MATERIAL, replace=False)
+        frictions = FRICTION * (1.0 + SCATTER * rng.standard_normal(OF_A_MATERIAL))
+        grasps = [with_friction(told[k], friction) for k, friction in zip(chosen, frictions, strict=True)]
+        models.append(intercept_and_level(fit(grasps, method="hierarchical")))
+    found, half = np.array(models).swapaxes(0, 1)
     return found, np.abs(found - FRICTION) <= half
+
+
+def with_friction(outcome: Outcome, friction: float) -> Moments:
+    """What would be known of a grasp of another friction: all ratios of forces are so many times as large."""
+    own, factor = Moments.from_bytes(base64.b64decode(outcome.moments)), np.array([1.0, 1.0, friction / outcome.truth])
+    whole = replace(own.factor, mean=own.factor.mean * factor, triangle=own.factor.triangle * factor)
+    grasps = [
+        replace(each, mean=each.mean * factor, spread=each.spread * factor, within=each.within * factor)
+        for each in own.grasps
+    ]
+    return replace(own, factor=whole, grasps=tuple(grasps))
 
 
 def intercept_and_level(model: FrictionModel) -> tuple[FloatArray, FloatArray]:

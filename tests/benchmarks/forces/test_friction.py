@@ -3,7 +3,7 @@
 import base64
 import json
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.forces import friction as gel_friction
 from benchmarks.forces.friction import FRICTION, GRASPS, IN_PLANE, SCATTER, WITH_DEPTH, Outcome
-from estimators import Moments
+from estimators import Moments, fit
 from slipcore import FrictionSamples, GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 
@@ -82,6 +82,17 @@ def test_a_model_tells_level_and_intercept_and_keeps_its_moments() -> None:
     assert Moments.from_bytes(base64.b64decode(moments)).n == len(known)
     nothing = gel_friction.by_model(known.take(np.zeros(len(known), dtype=bool)))
     assert (np.isnan(nothing[:2]).all(), nothing[2]) == (True, "")
+
+
+def test_a_grasp_of_another_friction_has_the_moments_of_as_much_larger_ratios() -> None:
+    known = samples(0.5, np.random.default_rng(2))
+    moments = base64.b64encode(Moments.from_samples(known).to_bytes()).decode()
+    found = gel_friction.with_friction(replace(outcome(2), truth=0.5, moments=moments), 0.6)
+    ratio = 1.2 * known.friction_coefficient
+    expected = Moments.from_samples(replace(known, friction_coefficient=ratio, tangential_force=ratio))
+    models = [fit([each], method="hierarchical") for each in (found, expected)]
+    np.testing.assert_allclose(models[0].coefficients, models[1].coefficients, rtol=1e-6)
+    np.testing.assert_allclose(found.factor.mean, expected.factor.mean, rtol=1e-12)
 
 
 def test_materials_are_met_within_their_intervals_about_as_often_as_said(monkeypatch: pytest.MonkeyPatch) -> None:
