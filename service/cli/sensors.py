@@ -131,6 +131,12 @@ def calibrate_gel(
     noise: Annotated[
         float | None, typer.Option(help="Standard deviation of a marker's coordinate, m; else by the logs.")
     ] = None,
+    relative_thickness: Annotated[
+        Path | None,
+        typer.Option(
+            help="Of a gel not alike thick everywhere: a JSON file of rows, at each marker over its thickness."
+        ),
+    ] = None,
     mapping: MappingFile = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the gel to this JSON, for --gel.")
@@ -146,19 +152,20 @@ def calibrate_gel(
     from slipcore.forces import calibrate_gel as calibrated
 
     if output is not None:
-        refuse_inputs(output, *logs, mapping)
+        refuse_inputs(output, *logs, mapping, relative_thickness)
+    uneven = None if relative_thickness is None else _rows_of(relative_thickness)
     forces = _known_forces(known_force, len(logs))
     presses = [read_log(path, mapping) for path in logs]
     name = _sensor_name(sensor, presses[0].sensor) if store else ""
     with shown_progress("learning the gel"):
-        found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise)
+        found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise, uneven)
     calibration = found.to_json()
     if output is not None:
         write_whole(output, lambda beside: beside.write_text(dumps(calibration["gel"]), encoding="utf-8"))
     if store:
         deep = found.gel.thickness if found.gel.thickness <= THICKEST else None
         with connected(url, key) as client:
-            client.describe_sensor(name, found.gel.young_modulus, found.gel.poisson_ratio, deep, marker_depth)
+            client.describe_sensor(name, found.gel.young_modulus, found.gel.poisson_ratio, deep, marker_depth, uneven)
     if json:
         print_json(calibration)
     else:

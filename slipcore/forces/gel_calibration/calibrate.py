@@ -21,11 +21,13 @@ from slipcore.forces.gel_calibration.likelihood import (
     PressData,
     Presses,
     Seek,
+    ThicknessMap,
     evaluate_gel,
     first_contacts,
 )
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.uneven import thickest
 from slipcore.forces.recording import DisplacementData, error
 from slipcore.frames import FloatArray, GraspLog
 
@@ -89,27 +91,34 @@ def calibrate_gel(
     thickness: float | None = None,
     marker_depth: float = 0.0,
     noise: float | None = None,
+    relative_thickness: Sequence[Sequence[float]] | None = None,
 ) -> GelCalibration:
     """A gel from logs of presses on it: what is not given of it, from the displacement and the normal forces.
 
     ``known_force`` N of each log's hold, None where unknown; at least one unless ``young_modulus`` is given. What is
     given (Pa, m; ``thickness`` inf: a half-space) is taken as exact. ``noise`` m of a marker's coordinate (None:
-    estimated from each log). Of a log count the frames in which markers moved most. Raises ``InvalidInput`` for what
-    does not fit, also for logs in which nothing touches, and ``UnknownScale`` for a log not in metres.
+    estimated from each log). ``relative_thickness`` [n, m]: of a gel that is not alike thick everywhere, at each
+    marker, over ``thickness``, which is then finite. Of a log count the frames in which markers moved most. Raises
+    ``InvalidInput`` for what does not fit, also for logs in which nothing touches, and ``UnknownScale`` for a log not
+    in metres.
     """
-    given = _checked(young_modulus, poisson_ratio, thickness, marker_depth)
+    uneven = None if relative_thickness is None else tuple(tuple(map(float, row)) for row in relative_thickness)
+    given = _checked(young_modulus, poisson_ratio, thickness, marker_depth, uneven)
     forces = _forces(logs, known_force, young_modulus)
-    presses = _presses(logs, forces, marker_depth, noise)
+    presses = _presses(logs, forces, marker_depth, noise, uneven)
     search = _GelSearch.begun(presses, young_modulus, given)
     search.climb()
     search.look_around()
     return _calibration(search)
 
 
-def _checked(young: float | None, ratio: float | None, thickness: float | None, depth: float) -> Elasticity:
+def _checked(
+    young: float | None, ratio: float | None, thickness: float | None, depth: float, uneven: ThicknessMap | None
+) -> Elasticity:
     """What is given, NaN where nothing is; raises ``InvalidInput`` for what no gel has."""
     usual = GEL_CALIBRATION.first_ratio if ratio is None else ratio
-    Gel(1e6 if young is None else young, usual, math.inf if thickness is None else thickness, depth)
+    thick = math.inf if uneven is None else GEL.marker_depth / GEL.relative_thickness[0]  # more than any, and finite
+    Gel(1e6 if young is None else young, usual, thick if thickness is None else thickness, depth, uneven)
     return Elasticity(math.nan if ratio is None else ratio, math.nan if thickness is None else 1.0 / thickness)
 
 
@@ -120,7 +129,13 @@ def _forces(logs: Sequence[GraspLog], known: Sequence[float | None] | None, youn
     return [math.nan if force is None else float(force) for force in given]
 
 
-def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float, noise: float | None) -> Presses:
+def _presses(
+    logs: Sequence[GraspLog],
+    forces: list[float],
+    marker_depth: float,
+    noise: float | None,
+    uneven: ThicknessMap | None,
+) -> Presses:
     """What the logs' holds show."""
     first = logs[0]
     for log in logs:
@@ -132,7 +147,7 @@ def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float,
     recordings = [DisplacementData.of(log, noise) for log in logs]
     axes = min((recording.axes for recording in recordings), key=len)
     each = tuple(_held(*pair, len(axes) * len(position)) for pair in zip(recordings, forces, strict=True))
-    return Presses(position, marker_depth, axes, nodes, each)
+    return Presses(position, marker_depth, axes, nodes, each, first.position, uneven)
 
 
 def _lattice(log: GraspLog) -> tuple[FloatArray, Nodes]:
@@ -174,11 +189,16 @@ class _GelSearch:
         """With thicknesses that are far apart."""
         pitch = presses.nodes.grid.pitch[0]
         usual = Elasticity(GEL_CALIBRATION.first_ratio, 1.0 / (GEL_CALIBRATION.first_thickness * pitch))
+        thinnest, least = 1.0 / _thinnest(presses), _least_closeness(presses)
+        if math.isnan(given.closeness) and least >= thinnest:
+            allowed = f"one that is not too steep at {_thinnest(presses):.2g} m, the least thickness sought"
+            raise InvalidInput("relative_thickness", "a map that is too steep", f"{allowed}, or a given thickness")
+        usual = usual._replace(closeness=max(usual.closeness, least))
         first = Elasticity(*(b if math.isnan(a) else a for a, b in zip(given, usual, strict=True)))
         near, contacts = first_contacts(presses, first)
-        thinnest = 1.0 / _thinnest(near)
         others = [thinnest / GEL_CALIBRATION.factor**k for k in range(GEL_CALIBRATION.thicknesses)]
-        tried = [*others, 0.0] if math.isnan(given.closeness) else [given.closeness]
+        others = [each for each in others if each > least]
+        tried = [*others, least] if math.isnan(given.closeness) else [given.closeness]
         return cls(
             near,
             young_modulus,
@@ -194,7 +214,8 @@ class _GelSearch:
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Of what is sought."""
-        low, high = np.array([[GEL_CALIBRATION.least_ratio, 0.0], [0.5, 1.0 / _thinnest(self.presses)]])
+        least, most = _least_closeness(self.presses), 1.0 / _thinnest(self.presses)
+        low, high = np.array([[GEL_CALIBRATION.least_ratio, least], [0.5, most]])
         return low[self.free], high[self.free]
 
     @property
@@ -277,15 +298,25 @@ def _probability(evaluated: EvaluatedGel) -> float:
 
 
 def _thinnest(presses: Presses) -> float:
-    """Thickness (m) below which none is sought."""
-    return presses.marker_depth + GEL_CALIBRATION.thinnest * presses.nodes.grid.pitch[0]
+    """Thickness (m) below which none is sought: of a map, where it is thinnest."""
+    thin = presses.marker_depth + GEL_CALIBRATION.thinnest * presses.nodes.grid.pitch[0]
+    return thin if presses.relative_thickness is None else thin / min(map(min, presses.relative_thickness))
+
+
+def _least_closeness(presses: Presses) -> float:
+    """One over the thickness (1/m) above which none is sought: 0, or where a map becomes too steep."""
+    if presses.relative_thickness is None:
+        return 0.0
+    steep = thickest(presses.relative_thickness, presses.rest)
+    return (1.0 + GEL_CALIBRATION.least_precision) / min(steep, GEL.marker_depth)
 
 
 def _calibration(search: _GelSearch) -> GelCalibration:
     """What was found, with what the misfit and the model add to the intervals."""
     found, properties = _found(search), (_young_modulus, _poisson_ratio, _thickness)
     estimates = tuple(made(search, found) for made in properties)
-    gel = Elasticity(*found.values[1:]).gel(math.exp(found.values[0]), search.presses.marker_depth)
+    of_presses = search.presses.marker_depth, search.presses.relative_thickness
+    gel = Elasticity(*found.values[1:]).gel(math.exp(found.values[0]), *of_presses)
     sizes = np.sqrt(np.diag(found.covariance))
     sign = np.array([1.0, 1.0, -1.0])  # thickness grows as closeness falls
     scale = np.divide(sign, sizes, out=np.zeros(3), where=sizes > 0.0)
@@ -362,7 +393,7 @@ def _thickness(search: _GelSearch, found: _Found) -> GelEstimate:
 
 
 def _may_be_a_half_space(search: _GelSearch, found: _Found) -> bool:
-    if 1 not in search.free:
+    if 1 not in search.free or search.presses.relative_thickness is not None:
         return search.given.closeness == 0.0
     assert found.posterior is not None
     return found.posterior.density(search.free.index(1), 0.0) > GEL_CALIBRATION.half_space

@@ -17,10 +17,15 @@ from slipcore.forces.inverse.support import better_support, widened
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.response import response_matrix
+from slipcore.forces.operator.uneven import UnevenLayer
 from slipcore.frames import BoolArray, FloatArray
 
 Seek = Literal["nothing", "support", "both"]
 """What of contacts is sought anew: where they are, and the priors of their tractions."""
+
+
+ThicknessMap = tuple[tuple[float, ...], ...]
+"""A gel's ``relative_thickness``."""
 
 
 class Elasticity(NamedTuple):
@@ -31,10 +36,10 @@ class Elasticity(NamedTuple):
     poisson_ratio: float
     closeness: float
 
-    def gel(self, young_modulus: float, marker_depth: float) -> Gel:
+    def gel(self, young_modulus: float, marker_depth: float, relative_thickness: ThicknessMap | None = None) -> Gel:
         """Such a gel."""
         thickness = 1.0 / self.closeness if self.closeness > 0.0 else np.inf
-        return Gel(young_modulus, self.poisson_ratio, thickness, marker_depth)
+        return Gel(young_modulus, self.poisson_ratio, thickness, marker_depth, relative_thickness)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +56,8 @@ class PressData:
 @dataclass(frozen=True, slots=True, eq=False)
 class Presses:
     """Several on one sensor, whose markers lie at ``position`` [j, 2] m, ``marker_depth`` m below the surface, and are
-    seen along ``axes``; tractions are sought at ``nodes``.
+    seen along ``axes``; tractions are sought at ``nodes``. ``rest`` [n, m, 3] m: the same markers, on the surface
+    as it is, of a gel whose thickness follows a map, ``relative_thickness``.
     """
 
     position: FloatArray
@@ -59,11 +65,14 @@ class Presses:
     axes: tuple[int, ...]
     nodes: Nodes
     each: tuple[PressData, ...]
+    rest: FloatArray
+    relative_thickness: ThicknessMap | None = None
 
     def observations(self, elasticity: Elasticity) -> list[ObservationModel]:
         """How each press's displacement comes from tractions in Young's moduli."""
         unit = GEL.young_modulus[0]  # of any modulus: the response is in proportion to one over it
-        whole = response_matrix(elasticity.gel(unit, self.marker_depth), self.nodes, self.position)
+        gel = elasticity.gel(unit, self.marker_depth, self.relative_thickness)
+        whole = response_matrix(gel, self.nodes, self.position, UnevenLayer.of(gel, self.rest))
         seen = unit * whole[list(self.axes)].reshape(-1, 3, len(self.nodes))
         return [ObservationModel(seen, press.error) for press in self.each]
 

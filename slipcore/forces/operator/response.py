@@ -21,13 +21,14 @@ ODD_X, ODD_Y = frozenset({"xy", "zx", "xz"}), frozenset({"xy", "zy", "yz"})
 """Components that change their sign with x, and with y."""
 
 
-def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
+def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray, uneven: UnevenLayer | None = None) -> FloatArray:
     """Displacement of markers by traction on the nodes' hat functions: [3, j, 3, k] m/Pa.
 
     ``position`` [j, 2] m: markers at rest, at the gel's ``marker_depth``. Directions are x, y and *into* the gel, of
-    displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled.
+    displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled. ``uneven``:
+    the gel under these markers, if it is so.
     """
-    return response_matrices(gel, nodes.grid.pitch[0], [nodes.places()], position)[0]
+    return response_matrices(gel, nodes.grid.pitch[0], [nodes.places()], position, uneven=uneven)[0]
 
 
 def response_matrices(
@@ -39,7 +40,7 @@ def response_matrices(
     uneven: UnevenLayer | None = None,
 ) -> list[FloatArray]:
     """``response_matrix`` of several sets of ``nodes`` [k, 2] m, whose hat functions have the half-width ``pitch`` m,
-    and of displacement along some ``axes`` alone; ``uneven``: the gel under these markers, if it is so.
+    and of displacement along some ``axes`` alone.
     """
     if uneven is None:
         return _of_a_layer(gel, pitch, nodes, position, axes)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from slipcore.errors import InvalidInput
@@ -37,12 +38,9 @@ class UnevenLayer:
         """
         if gel.relative_thickness is None:
             return None
-        thickness = gel.thickness * np.array(gel.relative_thickness)
-        if thickness.shape != position.shape[:2]:
-            shape = list(thickness.shape)
-            raise InvalidInput("relative_thickness", f"of shape {shape}", f"{list(position.shape[:2])}, as the lattice")
+        thickness = gel.thickness * _of_lattice(gel.relative_thickness, position)
         surface, below = (_slope(position, height) for height in (position[..., 2], thickness))
-        steepest = float(np.linalg.norm(below, axis=1).max())
+        steepest = _steepest(below)
         if steepest > GEL.slope:
             allowed = f"one that changes the thickness by at most {GEL.slope:g} m a m"
             raise InvalidInput("relative_thickness", f"one that changes it by {steepest:.2g} m a m", allowed)
@@ -85,6 +83,26 @@ class UnevenLayer:
         weight = 1.0 / np.maximum(apart / apart.max(), RESPONSE.least_distance) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
         return np.sum(weight * self.thickness[which], axis=1), np.einsum("kn,knd->kd", weight, self.slope[which])
+
+
+def thickest(relative: ArrayLike, position: FloatArray) -> float:
+    """Thickness (m) up to which a map [n, m] of it is not too steep over a lattice [n, m, 3] m; inf of a flat one.
+
+    Raises ``InvalidInput`` for a map of another lattice.
+    """
+    steepest = _steepest(_slope(position, _of_lattice(relative, position)))
+    return GEL.slope / steepest if steepest > 0.0 else np.inf
+
+
+def _of_lattice(relative: ArrayLike, position: FloatArray) -> FloatArray:
+    shape, lattice = list(np.shape(relative)), list(position.shape[:2])
+    if shape != lattice:
+        raise InvalidInput("relative_thickness", f"of shape {shape}", f"{lattice}, as the lattice")
+    return np.asarray(relative, dtype=np.float64)
+
+
+def _steepest(slope: FloatArray) -> float:
+    return float(np.linalg.norm(slope, axis=1).max())
 
 
 def _slope(position: FloatArray, height: FloatArray) -> FloatArray:

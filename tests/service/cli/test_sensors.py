@@ -67,7 +67,12 @@ def test_a_calibration_of_this_machine_is_written_whole(client: Mock, tmp_path: 
 
 @pytest.mark.parametrize(("thickness", "told"), [(1.0, 1.0), (1.001, None), (4e-3, 4e-3)])
 def test_a_gel_that_is_thicker_than_a_metre_is_a_half_space_to_the_service(
-    client: Mock, monkeypatch: pytest.MonkeyPatch, capsys: Capture, thickness: float, told: float | None
+    client: Mock,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Capture,
+    tmp_path: Path,
+    thickness: float,
+    told: float | None,
 ) -> None:
     gel = Gel(2e5, 0.48, thickness)
     estimates = [
@@ -79,11 +84,15 @@ def test_a_gel_that_is_thicker_than_a_metre_is_a_half_space_to_the_service(
     monkeypatch.setattr(sensors, "read_log", lambda *_: SimpleNamespace(sensor="left"))
     given = ("--known-force", "2", "--young-modulus", "3", "--poisson-ratio", "0.4", "--thickness", "5")
     assert run("calibrate-gel", "1.npz", *given, "--marker-depth", "0.001", "--noise", "6", "--store") == 0
-    assert asked.call_args.args[1:] == ([2.0], 3.0, 0.4, 5.0, 1e-3, 6.0)
-    client.describe_sensor.assert_called_once_with("left", 2e5, 0.48, told, 1e-3)
+    assert asked.call_args.args[1:] == ([2.0], 3.0, 0.4, 5.0, 1e-3, 6.0, None)
+    client.describe_sensor.assert_called_once_with("left", 2e5, 0.48, told, 1e-3, None)
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "Gel by 1 logs, by which left is described"
     assert " ".join(out[3].split()) == "thickness [m] 0.004000 0.003000 … 0.005000 50.0%"
+    (tmp_path / "map.json").write_text("[[1.0, 0.9], [1.0, 1.1]]", encoding="utf-8")
+    assert run("calibrate-gel", "1.npz", "--relative-thickness", str(tmp_path / "map.json"), "--store") == 0
+    uneven = [[1.0, 0.9], [1.0, 1.1]]
+    assert asked.call_args.args[-1] == client.describe_sensor.call_args.args[-1] == uneven
 
 
 def test_a_log_without_a_sensor_s_name_needs_one_to_be_stored_by() -> None:
