@@ -22,17 +22,10 @@ from service.formats import (
     tracked_markers,
     unpack,
 )
-from service.http import (
-    authentication,
-    bodies,
-    connections,
-    context,
-    errors,
-    joined_writes,
-    request_middleware,
-    websockets,
-)
+from service.http import bodies, context, errors
 from service.http import sessions as cookies
+from service.http.middleware import authentication, request_middleware
+from service.http.protocol import connections, joined_writes, websockets
 from service.http.schemas import common
 from service.jobs import pipeline, process_executor, webhook
 from service.observability import access_log
