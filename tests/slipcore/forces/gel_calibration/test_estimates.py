@@ -41,7 +41,7 @@ def search(
         elasticity = Elasticity(ratio, middle + away)
         tried.append(EvaluatedGel(elasticity, -0.5 * k**2 + 3.0, (), modulus, np.ones(1), misfit))
     nodes = SimpleNamespace(grid=SimpleNamespace(pitch=(1e-3, 1e-3)))
-    presses: Any = SimpleNamespace(axes=axes, nodes=nodes, marker_depth=0.0)
+    presses: Any = SimpleNamespace(axes=axes, nodes=nodes, marker_depth=0.0, relative_thickness=None)
     return _GelSearch(presses, young_modulus, Elasticity(ratio, math.nan), tried)
 
 
