@@ -151,5 +151,5 @@ def collect_history(slip_states: Sequence[SlipState], state: DetectorState) -> S
     noise, method = state.noise, state.setup.method
     return SlipHistory(
         time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed,
-        findings=findings_by(method, state.memory.common),
+        findings=findings_by(method, state.memory.common, state.of_method),
     )  # fmt: skip

@@ -34,11 +34,12 @@ METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
 """A further method joins by a file of its own, or a room if it has several, and a line here."""
 
 
-def findings_by(name: str, common: FloatArray) -> tuple[Finding, ...]:
-    """What the method of that name found inconsistent, from its memory's ``common``."""
+def findings_by(name: str, common: FloatArray, of_method: Any = None) -> tuple[Finding, ...]:
+    """What the method of that name found inconsistent, from its memory's ``common``, or from its own state."""
     method = find_method(name)
-    known = method.findings if isinstance(method, CompiledMethod) else None
-    return known(common) if known is not None else ()
+    if method.findings is None:
+        return ()
+    return method.findings(common if isinstance(method, CompiledMethod) else of_method)
 
 
 def find_method(name: str) -> Method[Any, Any] | CompiledMethod[Any]:

@@ -17,6 +17,7 @@ from slipcore.detection.coarse.joining import Evidence, join
 from slipcore.detection.coarse.layers import Layers, considered, no_layers
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.filter.loading import low_pass
+from slipcore.detection.filter.state import DOUBTED_FRAMES
 from slipcore.detection.forces_only import method as by_force
 from slipcore.detection.forces_only.step import ForcesState
 from slipcore.detection.shared.contact import ContactThreshold
@@ -34,6 +35,7 @@ from slipcore.detection.shared.records import (
     read_only,
     unwritten,
 )
+from slipcore.finding import Finding
 from slipcore.surface.strain import Lattice
 
 
@@ -59,7 +61,7 @@ def init(lattice: Lattice, options: CoarseOptions) -> CoarseState:
 def step(
     state: CoarseState, lattice: Lattice, seen: ObservedFrame, options: CoarseOptions
 ) -> tuple[CoarseState, Decision]:
-    """All three, on the same contact; without forces the filter's word alone."""
+    """All three, on the same contact; without forces to believe the filter's word alone."""
     forces, decision = by_force.step(state.forces, lattice, seen, options)
     last = unwritten(state.frame)
     frame = FrameArrays(
@@ -74,7 +76,8 @@ def step(
     velocity = np.empty((*seen.contact.shape, 2))
     arguments = _sensor(lattice, options), last, frame, state.memory, after
     by_place.METHOD.run(*map(tuple, arguments), velocity)  # as in ``detector.step``, lest another kernel is compiled
-    if not seen.force.size:
+    doubted = after.common[DOUBTED_FRAMES] > state.memory.common[DOUBTED_FRAMES]
+    if doubted or not seen.force.size:
         least = expit(-options.largest_sum)
         probability = np.clip(after.probability, least, 1.0 - least)
         return CoarseState(forces, state.layers, after, frame), Decision(probability > 0.5, probability)
@@ -106,4 +109,9 @@ def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
     return DetectorSetup(position, steps, inverse, lattice.orientation, touch, touch, settings)
 
 
-METHOD = Method(CoarseOptions, init, step)
+def findings(state: CoarseState) -> tuple[Finding, ...]:
+    """What the filter found inconsistent."""
+    return by_place.findings(state.memory.common)
+
+
+METHOD = Method(CoarseOptions, init, step, findings)

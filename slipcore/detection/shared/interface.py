@@ -40,12 +40,14 @@ class ObservedFrame(NamedTuple):
 class Method(NamedTuple, Generic[State, Options]):
     """A detection method: its options, and pure functions on an immutable state of its own choosing.
 
-    ``init`` makes the state of a method that has seen nothing; ``step`` takes each frame.
+    ``init`` makes the state of a method that has seen nothing; ``step`` takes each frame; ``findings``: what its state
+    says is inconsistent in the frames so far, None for a method that does not look.
     """
 
     options: type[Options]
     init: Callable[[Lattice, Options], State]
     step: Callable[[State, Lattice, ObservedFrame, Options], tuple[State, Decision]]
+    findings: Callable[[State], tuple[Finding, ...]] | None = None
 
 
 class Start(NamedTuple):
