@@ -43,7 +43,8 @@ ENTRIES = {
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor heading_length", "0 but of reconstructed forces, which the page's logs do not have"),
     "coarse": (
-        "layers layers_weight layer_misfit layer_evidence layer_stick_share layer_stick_width spring_spread",
+        "layers layers_weight layer_misfit layer_evidence layer_stick_share layer_stick_width spring_spread "
+        "many_elements",
         "tried on the tuning scenes; docs/sensors.md says how far F1 changes",
     ),
     "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),

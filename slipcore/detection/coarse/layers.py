@@ -82,6 +82,7 @@ class LayerTuning(NamedTuple):
     largest_sum: float
     filter_weight: float
     layers_weight: float
+    many_elements: float
 
 
 _TUNING = len(LayerTuning._fields)
