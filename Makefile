@@ -50,8 +50,8 @@ types: setup
 	$(BIN)/mypy
 
 unit: setup recordings kernels
-	@echo "== tests"
-	$(PYTEST) -m "not long" -n 2 --dist worksteal
+	@echo "== tests"  # many of them wait for a server: three processes keep two cores busy
+	$(PYTEST) -m "not long" -n 3 --dist worksteal
 
 coverage: setup recordings kernels  ## the tests again, with the lines that none of them runs; takes a third longer
 	$(PYTEST) -m "not long" -n 2 --dist worksteal --cov --cov-report=term
