@@ -23,7 +23,7 @@ WORLD := world = reduced.World(friction=np.full((1, 20, 20), 0.4)); load = reduc
 BEAMS := beams = BeamLattice((2, 2), 1e-3, 1e3, 1e2); drag(beams, unloaded(beams), np.array([1e-6, 0.0, 0.0]), np.ones((2, 2)))
 COMPILE_FOR_TESTS := $(BIN)/python -c 'import numpy as np; from slipcore.contact import reduced; $(WORLD); \
     from slipcore.contact.reference.beam_chain import BeamLattice, drag, unloaded; $(BEAMS)'
-# Two processes of tests share two cores: threads of BLAS beside them wait for each other, at six times the time.
+# Processes of tests share two cores: threads of BLAS beside them wait for each other, at six times the time.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
     --no-emit-package stiction --no-emit-package stiction-client
