@@ -662,7 +662,7 @@ class CoarseOptions(ForcesOnlyOptions):
     filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.5")] = 0.4
     """Weight of the log-odds of method ``filter`` beside those of the forces."""
     many_elements: Annotated[float, Option(1.0, 1e9, "-", "tuning scenes: the same within .003 from 30 to 60")] = 45.0
-    """How many elements have to touch for the filter to count as much as forces and layers; beyond, ever more."""
+    """How many elements have to touch for forces and layers to count half as much as on few; beyond, ever less."""
     largest_sum: Annotated[float, Option(1.0, 30.0, "log-odds", "tuning scenes")] = 9.0
     """Largest log-odds of any of them."""
     layers_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; more adds false slip")] = 1.5

@@ -23,7 +23,8 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclass(frozen=True, slots=True, eq=False)
 class Observer:
     """What turns the frames of one sensor into observations: the ``position`` [n, m, 3] m of its markers at rest, the
-    ``last`` slip states, and what the elements ``beside`` the contact bear (N, N, N, N·m), averaged over as many.
+    ``last`` slip states, and what the elements ``beside`` the contact bear (N, N, N, N·m): a running mean in which a
+    new frame counts one in so many states as there are.
     """
 
     position: FloatArray

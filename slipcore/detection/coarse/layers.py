@@ -9,14 +9,13 @@ both the forces of elements and what share of each still sticks follow from the 
 """
 
 import math
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NUMERICS, CoarseOptions
-from slipcore.detection.forces_only.tuning import Considered, frictions, prior
+from slipcore.detection.forces_only.tuning import Considered
 from slipcore.frames import FloatArray
 
 _LEAST_FORCE, _LEAST_SPREAD = NUMERICS.least_element_force, NUMERICS.least_spread
@@ -86,13 +85,6 @@ class LayerTuning(NamedTuple):
 
 
 _TUNING = len(LayerTuning._fields)
-
-
-@cache
-def considered(options: CoarseOptions) -> Considered:
-    """What the kernels take of the options."""
-    settings = [getattr(options, name) for name in LayerTuning._fields]
-    return Considered(frictions(options), prior(options), np.array(settings, float))
 
 
 @compiled

@@ -14,12 +14,13 @@ from scipy.special import expit
 
 from slipcore.defaults import CoarseOptions, FilterOptions
 from slipcore.detection.coarse.joining import Evidence, join
-from slipcore.detection.coarse.layers import Layers, considered, no_layers
+from slipcore.detection.coarse.layers import Layers, LayerTuning, no_layers
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.filter.state import DOUBTED_FRAMES
 from slipcore.detection.forces_only import method as by_force
 from slipcore.detection.forces_only.step import ForcesState
+from slipcore.detection.forces_only.tuning import considered
 from slipcore.detection.shared.contact import ContactThreshold
 from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.lasting_noise import start_noise
@@ -95,7 +96,8 @@ def step(
         decision.probability,
         after.probability,
     )
-    plain: list[Any] = [tuple(part) for part in (evidence, state.layers, considered(options), layers, joined)]
+    known = considered(options, LayerTuning._fields)
+    plain: list[Any] = [tuple(part) for part in (evidence, state.layers, known, layers, joined)]
     join(*plain)  # numba is slow at named tuples from Python
     return CoarseState(forces, layers, after, frame), joined
 

@@ -57,9 +57,9 @@ _TUNING = len(ForcesTuning._fields)
 
 
 @cache
-def considered(options: ForcesOnlyOptions) -> Considered:
-    """What the kernels take of the options."""
-    settings = [getattr(options, name) for name in ForcesTuning._fields]
+def considered(options: ForcesOnlyOptions, names: tuple[str, ...] = ForcesTuning._fields) -> Considered:
+    """What the kernels take of the options: friction coefficients, and those of these names as an array."""
+    settings = [getattr(options, name) for name in names]
     return Considered(frictions(options), prior(options), np.array(settings, float))
 
 

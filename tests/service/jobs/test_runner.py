@@ -137,7 +137,10 @@ def test_a_job_that_is_stored_is_begun_at_once_when_the_runner_is_woken(
         runner.wake()
         until_finished(database, [extra])(runner)
 
-    working(lambda claim: finish(database, claim), store, poll_seconds=60.0, lease_seconds=600.0)
+    longer_than_waits = 600.0
+    working(
+        lambda claim: finish(database, claim), store, poll_seconds=longer_than_waits, lease_seconds=longer_than_waits
+    )
 
 
 def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(

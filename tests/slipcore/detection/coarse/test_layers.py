@@ -7,20 +7,20 @@ from slipcore.defaults import CoarseOptions
 from slipcore.detection.coarse.layers import (
     NORMAL,
     Layers,
+    LayerTuning,
     PressedElements,
-    considered,
     load_layers,
     look_at_layers,
     no_layers,
     spread_of_stiffness,
     sums,
 )
-from slipcore.detection.forces_only.tuning import Considered
+from slipcore.detection.forces_only.tuning import Considered, considered
 from slipcore.frames import FloatArray
 
 FRICTION, FORCE, RADIUS, SIDE = 0.45, 8.0, 5e-3, 6
 OPTIONS = CoarseOptions()
-CONSIDERED = considered(OPTIONS)
+CONSIDERED = considered(OPTIONS, LayerTuning._fields)
 
 
 def fine_points() -> tuple[FloatArray, FloatArray]:
