@@ -28,8 +28,8 @@ COLUMNS = {
     "estimators": (0.33, 0.41),
     "db": (0.42, 0.49),
     "migrations": (0.48, 0.62),
-    "stiction_client": (0.61, 0.78),
-    "service": (0.78, 1.0),
+    "stiction_client": (0.6, 0.76),
+    "service": (0.76, 1.0),
 }
 """From where to where each package is drawn, of the picture's width."""
 

@@ -11,8 +11,8 @@ from db import identity, migrate
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import runners
-from service.domain import keys
-from service.domain.model_cache import ModelCache
+from service.domain.access import keys
+from service.domain.models.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.http import access, errors, openapi
 from service.http.context import ServerContext

@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -307,14 +307,40 @@ ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")
 """From the ground up: each may import those before it."""
 
 
+def imports_upward(folder: Path, rooms: Sequence[str], above: Collection[str] = ()) -> dict[str, set[str]]:
+    """The files of a folder's rooms that import a room after their own or what stands ``above`` all, with that."""
+    name, found = folder.name if folder.parent == ROOT else f"{folder.parent.name}.{folder.name}", {}
+    for position, room in enumerate(rooms):
+        barred = tuple(f"{name}.{other}" for other in (*rooms[position + 1 :], *above))
+        files = sorted((folder / room).rglob("*.py"))
+        assert files, room
+        found |= {f"{room}/{path.name}": {n for n in imported_modules(path) if n.startswith(barred)} for path in files}
+    return {path: names for path, names in found.items() if names}
+
+
 def test_the_rooms_of_estimators_import_one_way() -> None:
-    for position, room in enumerate(ESTIMATOR_ROOMS):
-        above = tuple(f"estimators.{other}" for other in (*ESTIMATOR_ROOMS[position + 1 :], "fitting", "moments"))
-        files = sorted((ROOT / "estimators" / room).glob("*.py"))
-        assert files
-        for path in files:
-            upward = {name for name in imported_modules(path) if name.startswith(above)}
-            assert not upward, f"{path.relative_to(ROOT)} imports {sorted(upward)}"
+    assert imports_upward(ROOT / "estimators", ESTIMATOR_ROOMS, ("fitting", "moments")) == {}
+
+
+DOMAIN_ROOMS = ("models", "access", "resources", "jobs", "sensors", "materials", "logs", "uploads", "planning")
+"""The use cases by what they are about, from the ground up: each may import those before it; errors are for all."""
+
+
+def test_the_rooms_of_use_cases_import_one_way() -> None:
+    folder = ROOT / "service" / "domain"
+    assert {path.parent.name for path in folder.glob("*/__init__.py")} == set(DOMAIN_ROOMS)
+    assert {path.name for path in folder.glob("*.py")} == {"__init__.py", "errors.py"}
+    assert imports_upward(folder, DOMAIN_ROOMS) == {}
+
+
+def test_a_room_that_imports_one_above_it_is_found(tmp_path: Path) -> None:
+    for room, text in {"cellar": "def lazily():\n    from service.house.roof import tiles", "roof": ""}.items():
+        path = tmp_path / "service" / "house" / room / "beams.py"
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+    found = imports_upward(tmp_path / "service" / "house", ("cellar", "roof"))
+    assert set(found) == {"cellar/beams.py"}
+    assert imports_upward(tmp_path / "service" / "house", ("roof", "cellar")) == {}
 
 
 def test_only_the_application_knows_the_pages_and_these_ask_no_tables() -> None:
@@ -397,7 +423,7 @@ def test_a_command_that_imports_the_server_is_found(tmp_path: Path, text: str) -
 
 
 def test_use_cases_take_plain_arguments() -> None:
-    for path in sorted((ROOT / "service" / "domain").glob("*.py")):
+    for path in sorted((ROOT / "service" / "domain").rglob("*.py")):
         assert not third_party(path) & {"fastapi", "starlette", "pydantic"}, path
 
 
@@ -463,7 +489,7 @@ def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
         ("http.routes.grasp_logs.create_grasp_log", "db.repositories.grasp_logs.add"),
         ("web.routes.uploads.receive_upload", "db.repositories.grasp_logs.add"),
         ("http.routes.materials.create_fit", "db.repositories.materials.hold"),
-        ("http.routes.materials.read_friction", "service.domain.look_up.look_up"),
+        ("http.routes.materials.read_friction", "service.domain.planning.look_up.look_up"),
         ("http.routes.planning.recognise_material", "estimators.recognise"),
         ("http.routes.stream.live_stream", "service.stream.detectors.step"),
         ("http.routes.stream.live_stream", "db.repositories.grasp_logs.add"),

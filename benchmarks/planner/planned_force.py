@@ -35,8 +35,8 @@ from estimators import FrictionModel as FittedModel
 from estimators import Moments, ScatterPrior, WorkingPoint
 from estimators.defaults import INFLUENCE
 from estimators.influence import counted_on
-from service.domain.stored_results import to_new_model
-from service.domain.weakening import LOG, with_weakening
+from service.domain.models.stored_results import to_new_model
+from service.domain.models.weakening import LOG, with_weakening
 from stiction_client import Contact, FrictionModel, required_normal_force
 
 LOGS, OTHERS = (3, 10, 30), (0, 10)

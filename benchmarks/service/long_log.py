@@ -18,7 +18,7 @@ import slipcore
 from benchmarks.pages import options, picture_folder, table, write
 from benchmarks.service.ingest import SHORT
 from service import formats
-from service.domain.stored_results import encode_history, encode_samples, summarise_history, summarise_samples
+from service.domain.models.stored_results import encode_history, encode_samples, summarise_history, summarise_samples
 from slipcore import GraspLog
 from slipcore.contact import tangential_ramp
 from stiction_client import container

@@ -30,7 +30,7 @@ def _named(folder: str) -> Path:
 def _tell_keys(database: "Database") -> None:
     """That keys of a backup are good again that were revoked since, which nobody would look for."""
     from db.repositories import access_keys
-    from service.domain.keys import is_valid
+    from service.domain.access.keys import is_valid
 
     with database.read() as session:
         valid = sum(is_valid(key) for key in access_keys.list_all(session))

@@ -32,7 +32,7 @@ def exit_code(error: Exception) -> int | None:
 
     from db.errors import DatabaseError
     from estimators.errors import EstimatorError
-    from service.domain.keys import NoKeys
+    from service.domain.access.keys import NoKeys
     from slipcore.errors import SlipcoreError
     from stiction_client.errors import InvalidArgument, NoFeasibleForce, StictionError
 

@@ -38,7 +38,7 @@ class InspectedLog:
 
     def findings(self) -> "list[Finding]":
         """What makes friction from it doubtful."""
-        from service.domain.reconstruct import reconstruction_findings
+        from service.domain.sensors.reconstruct import reconstruction_findings
         from slipcore import check_log
 
         return [*reconstruction_findings(self.log, self.reconstruction), *check_log(self.log, self.history)]
@@ -90,7 +90,7 @@ def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tupl
 
 def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstruction | None]":
     """By the gel, if there is one, where the log has none; raises ``UnknownScale`` for one that is not in metres."""
-    from service.domain.reconstruct import with_forces
+    from service.domain.sensors.reconstruct import with_forces
 
     if gel is None:
         return log, None

@@ -38,7 +38,7 @@ def create(
     """Make a key and print it: this once, for only its digest is stored."""
     from db.repositories import access_keys, audit
     from db.tables import now
-    from service.domain.keys import digest, new_key
+    from service.domain.access.keys import digest, new_key
 
     if not 0 < len(name) <= 100 or not name.isprintable() or name != name.strip():
         raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters, no space at the ends")

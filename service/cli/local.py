@@ -109,8 +109,8 @@ def fit(
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
-    from service.domain.doubtful_logs import with_doubts, with_reconstructed
-    from service.domain.same_grasp import Grasps, same_grasp
+    from service.domain.logs.doubtful_logs import with_doubts, with_reconstructed
+    from service.domain.logs.same_grasp import Grasps, same_grasp
 
     grasps = Grasps()
 

@@ -59,7 +59,7 @@ def _of_log(
     mapping: Path | None,
     rest: str | None,
 ) -> "Report":
-    from service.domain.grasp_report import report_of_log
+    from service.domain.logs.grasp_report import report_of_log
 
     return report_of_log(read_log(path, mapping, scale, frame_rate, rest), path.name, method)
 

@@ -13,9 +13,9 @@ from fastapi.security.base import SecurityBase
 from starlette.requests import HTTPConnection
 
 from db.records import Scope
+from service.domain.access.keys import SCOPES
+from service.domain.access.principal import Principal
 from service.domain.errors import InsufficientScope
-from service.domain.keys import SCOPES
-from service.domain.principal import Principal
 
 CHALLENGE = 'Bearer realm="stiction"'
 CHALLENGE_OF_INVALID_KEY = f'{CHALLENGE}, error="invalid_token"'

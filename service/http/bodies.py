@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Message, Receive, Scope
 
-from service.domain.receive import unless_gone
+from service.domain.resources.receive import unless_gone
 from service.http.access import principal
 from service.http.context import ServerContext
 from service.http.fair_route import FairRoute, gone

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from service.domain.context import Context
+from service.domain.resources.context import Context
 from service.jobs.scrub import Scrub
 from service.observability.store_watch import StoreWatch
 from service.processes.fair_queue import AdaptiveShareQueue, FairQueue, UnboundedFairQueue

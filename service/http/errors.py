@@ -14,8 +14,8 @@ from starlette.routing import Match, Router
 
 from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
 from service.domain import errors
-from service.domain.damage import record_damage
 from service.domain.errors import DomainError, InsufficientScope
+from service.domain.logs.damage import record_damage
 from service.http.access import CHALLENGE_OF_INVALID_KEY, challenge_of_scope
 from service.http.problems import (
     BAD_REQUEST,

@@ -9,7 +9,7 @@ from fastapi import Depends, Request, Response
 from fastapi.params import Depends as Dependency
 from fastapi.routing import APIRoute
 
-from service.domain.receive import unless_gone
+from service.domain.resources.receive import unless_gone
 from service.http.access import CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.parameters import KNOWN_PARAMETERS, query_parameters

@@ -12,7 +12,7 @@ from starlette.requests import HTTPConnection
 from db.database import Database
 from db.records import AccessKey
 from db.repositories import browser_sessions
-from service.domain.keys import digest
+from service.domain.access.keys import digest
 
 COOKIE = "stiction_session"
 LIFETIME = timedelta(hours=12)

@@ -26,27 +26,18 @@ from db.repositories import audit, detections, friction_models, grasp_logs, jobs
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
 from service import formats
-from service.domain.calibrate import corrected, correction_findings
-from service.domain.collect_friction import collect
-from service.domain.doubtful_logs import (
+from service.domain.jobs.queueing import INGEST_METHODS, queue_cheap_refits
+from service.domain.logs.collect_friction import collect
+from service.domain.logs.doubtful_logs import (
     with_doubts,
     with_others_calibrations,
     with_others_gels,
     with_reconstructed,
     with_unchecked,
 )
-from service.domain.other_materials import prior_from_others
-from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
-from service.domain.reconstruct import (
-    bytes_needed,
-    described_by_another,
-    needs_forces,
-    reconstruction_findings,
-    with_forces,
-)
-from service.domain.same_grasp import MOST_LOGS, find_alike, fingerprint, same_grasp, signature, with_copies
-from service.domain.sensors import grasping
-from service.domain.stored_results import (
+from service.domain.logs.same_grasp import MOST_LOGS, find_alike, fingerprint, same_grasp, signature, with_copies
+from service.domain.models.other_materials import prior_from_others
+from service.domain.models.stored_results import (
     decode_samples,
     encode_history,
     encode_samples,
@@ -55,8 +46,17 @@ from service.domain.stored_results import (
     summarise_samples,
     to_new_model,
 )
-from service.domain.surface_change import MARK, with_change
-from service.domain.weakening import with_weakening
+from service.domain.models.surface_change import MARK, with_change
+from service.domain.models.weakening import with_weakening
+from service.domain.sensors.calibrate import corrected, correction_findings
+from service.domain.sensors.names import grasping
+from service.domain.sensors.reconstruct import (
+    bytes_needed,
+    described_by_another,
+    needs_forces,
+    reconstruction_findings,
+    with_forces,
+)
 from service.observability import logs, traces
 from service.processes import limits
 from slipcore import FrictionSamples, GraspLog, SlipcoreError

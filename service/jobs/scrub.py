@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, DatabaseError, NotFound
-from service.domain.damage import record_damage
+from service.domain.logs.damage import record_damage
 from service.periodic_thread import PeriodicThread
 
 logger = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from db.database import Database
 from db.errors import BlobDamaged, ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs
-from service.domain.damage import record_damage
+from service.domain.logs.damage import record_damage
 from service.jobs.executor import reason_of
 from service.observability import logs
 from service.processes import limits

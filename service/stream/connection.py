@@ -14,15 +14,15 @@ from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
 from db.records import Sensor
 from db.repositories import sensors
-from service.domain.context import Context
+from service.domain.access.keys import check_not_ended
+from service.domain.access.principal import Principal
 from service.domain.errors import DomainError, KeyEnded, NoModel
-from service.domain.keys import check_not_ended
-from service.domain.principal import Principal
-from service.domain.recommended import AUTO
-from service.domain.reconstruct import described_by_another
-from service.domain.sensors import grasping
-from service.domain.stored_results import to_client_model
-from service.domain.upload import UploadRequest, check_target
+from service.domain.models.recommended import AUTO
+from service.domain.models.stored_results import to_client_model
+from service.domain.resources.context import Context
+from service.domain.sensors.names import grasping
+from service.domain.sensors.reconstruct import described_by_another
+from service.domain.uploads.upload import UploadRequest, check_target
 from service.formats.reading import Description
 from service.json_objects import RepeatedKey
 from service.stream import detectors

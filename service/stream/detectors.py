@@ -15,7 +15,7 @@ import estimators
 import slipcore
 from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
-from service.domain.reconstruct import early_touch
+from service.domain.sensors.reconstruct import early_touch
 from service.formats.reading import Description, describe
 from service.processes.fair_executor import FairExecutor
 from service.report.wording import LEVELS

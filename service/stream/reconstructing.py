@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.domain.reconstruct import at_end_of_range, contradicted
+from service.domain.sensors.reconstruct import at_end_of_range, contradicted
 from service.processes.fair_executor import FairExecutor
 from slipcore import Frame, InvalidInput
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
-from service.domain.networks import network_of
+from service.domain.access.networks import network_of
 from service.formats.reading import Description
 from service.processes.completion import run_to_completion
 from service.processes.fair_queue import UnboundedFairQueue

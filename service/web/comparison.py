@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from db.records import StoredModel
-from service.domain.stored_results import to_friction_model
+from service.domain.models.stored_results import to_friction_model
 from service.report.wording import LEVELS
 from service.web.charts import Curve, ManyChart, draw_together
 from service.web.friction import POINTS, FrictionEstimate, friction_at

@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from service.domain.context import Context
-from service.domain.principal import Principal
+from service.domain.access.principal import Principal
+from service.domain.resources.context import Context
 from service.http.download import Download
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from service.domain.plan import ForceCurve
+from service.domain.planning.plan import ForceCurve
 from service.web.charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Tick, rounded, ticks
 
 LEAST, MOST = 1e-6, 0.5

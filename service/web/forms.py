@@ -15,9 +15,9 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 
 from db.text import is_storable
-from service.domain.context import Context
+from service.domain.access.networks import network_of
 from service.domain.errors import UploadInterrupted, shown
-from service.domain.networks import network_of
+from service.domain.resources.context import Context
 from service.http.bodies import MOST_FIELDS, limited, media_type
 from service.http.fair_route import FairRoute
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service import formats
-from service.domain.stored_results import StoredHistory, StoredPatches, decode_history
+from service.domain.models.stored_results import StoredHistory, StoredPatches, decode_history
 from service.formats.lattice import columns_and_rows, lattice_axes
 from service.packed_arrays import Arrays, pack_arrays
 from slipcore.frames import GraspLog

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from db.records import Material, StoredModel
-from service.domain.recommended import disagreeing, recommended
-from service.domain.record_next import RecordNext, record_next
-from service.domain.stored_results import to_friction_model
+from service.domain.models.recommended import disagreeing, recommended
+from service.domain.models.stored_results import to_friction_model
+from service.domain.planning.record_next import RecordNext, record_next
 from service.report.wording import COEFFICIENTS, LEVELS
 from service.web.charts import Chart, Curve, draw
 from stiction_client.support import OUTDATED, Support

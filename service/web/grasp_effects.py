@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from db.records import SampledLog, StoredModel
-from service.domain.sensors import grasping
-from service.domain.stored_results import to_friction_model
+from service.domain.models.stored_results import to_friction_model
+from service.domain.sensors.names import grasping
 from service.web.charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Tick
 
 if TYPE_CHECKING:

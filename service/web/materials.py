@@ -1,7 +1,7 @@
 """Names of materials, for the forms that ask for one."""
 
 from db.repositories import materials
-from service.domain.context import Context
+from service.domain.resources.context import Context
 
 FIRST_NAMES = 200
 """So many are offered; any other may be typed."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from db.records import StoredModel
-from service.domain.stored_results import to_friction_model
+from service.domain.models.stored_results import to_friction_model
 from service.web.charts import BOTTOM, LEFT, RIGHT, TOP, WIDTH, Axis, Tick, points
 
 FloatArray = NDArray[np.float64]

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from db.records import StoredGraspLog
 from service import formatting
-from service.domain.reconstruct import BY_DISPLACEMENT
+from service.domain.sensors.reconstruct import BY_DISPLACEMENT
 from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
 from service.report.wording import record_next

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from db.records import StoredGraspLog
-from service.domain.context import Context
-from service.domain.principal import Principal
-from service.domain.record_next import RecordNext
+from service.domain.access.principal import Principal
+from service.domain.planning.record_next import RecordNext
+from service.domain.resources.context import Context
 from service.http.download import Download
 from service.web.derived import derive
 from stiction_client.records import GraspLogReceipt, Material
@@ -25,7 +25,7 @@ async def show(context: Context, principal: Principal, kind: str, write: Callabl
 
 def write_log(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None, target: Path) -> None:
     """Write the report of a stored log; ``upload`` is None where it was deleted."""
-    from service.domain.grasp_report import report_of_stored
+    from service.domain.logs.grasp_report import report_of_stored
     from service.report.page import write_report
 
     write_report(report_of_stored(log, history, samples, upload), target)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from db.records import NewModel
-from service.domain.stored_results import decode_samples, to_friction_model
+from service.domain.models.stored_results import decode_samples, to_friction_model
 from service.packed_arrays import pack_arrays
 from service.report.wording import LEVELS
 from slipcore.samples import FrictionSamples

@@ -11,7 +11,7 @@ import pytest
 
 import estimators
 from db.records import StoredModel
-from service.domain.stored_results import to_friction_model, to_new_model
+from service.domain.models.stored_results import to_friction_model, to_new_model
 from service.http.schemas.models import FrictionModelOut
 from stiction_client import FrictionModel, InvalidArgument, Scale, Scales, SensorFriction, SensorScale
 

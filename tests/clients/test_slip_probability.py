@@ -8,7 +8,7 @@ import pytest
 import estimators
 from benchmarks.estimators.scatter import AREA, CONTACT, Kind, achieved, grasp
 from db.records import StoredModel
-from service.domain.stored_results import to_new_model
+from service.domain.models.stored_results import to_new_model
 from service.http.schemas.models import FrictionModelOut
 from stiction_client import FrictionModel, required_normal_force
 

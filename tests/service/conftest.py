@@ -23,8 +23,8 @@ from db.database import Database
 from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
 from service.app import create_app
-from service.domain import keys
-from service.domain.model_cache import ModelCache
+from service.domain.access import keys
+from service.domain.models.model_cache import ModelCache
 from service.http.context import ServerContext
 from service.jobs import worker
 from service.observability import logs

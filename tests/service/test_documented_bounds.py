@@ -9,7 +9,11 @@ import pytest
 from db import defaults
 from service.cli import exit_codes
 from service.demo import inputs
-from service.domain import await_job, curate, ownership, receive, same_grasp, upload
+from service.domain.jobs import await_job
+from service.domain.logs import same_grasp
+from service.domain.materials import curate, ownership
+from service.domain.resources import receive
+from service.domain.uploads import upload
 from service.formats import (
     archive,
     assemble,

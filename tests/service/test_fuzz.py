@@ -15,7 +15,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
 from service.settings import Settings
 
 CHECKS = (

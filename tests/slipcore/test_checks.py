@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from service.domain.calibrate import CORRECTED_BY_ANOTHER
-from service.domain.reconstruct import BY_ANOTHERS_GEL, CONTRADICTED, NOT_CHECKED, RECONSTRUCTED
+from service.domain.sensors.calibrate import CORRECTED_BY_ANOTHER
+from service.domain.sensors.reconstruct import BY_ANOTHERS_GEL, CONTRADICTED, NOT_CHECKED, RECONSTRUCTED
 from slipcore import Finding, GraspLog, InvalidInput, check_log, collect_friction, detect_slip
 from slipcore.checks import AGAINST_FRICTION
 from slipcore.checks.contact import _load_ratio

@@ -14,10 +14,10 @@ from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import AccessKey
 from db.repositories import access_keys
-from service.domain import keys
-from service.domain.context import Context
-from service.domain.keys import NO_KEY, is_loopback
-from service.domain.networks import network_of
+from service.domain.access import keys
+from service.domain.access.keys import NO_KEY, is_loopback
+from service.domain.access.networks import network_of
+from service.domain.resources.context import Context
 from service.http import origin, problems, sessions
 from service.http.access import CHALLENGE, CHALLENGE_OF_INVALID_KEY, EVERYTHING, Access, is_public
 from service.http.problems import (

@@ -12,10 +12,10 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from db.errors import NotFound, StorageUnavailable
-from service.domain.context import Context
 from service.domain.errors import NoModel
-from service.domain.look_up import FrictionQuery, look_up
-from service.domain.model_cache import KnownModel
+from service.domain.models.model_cache import KnownModel
+from service.domain.planning.look_up import FrictionQuery, look_up
+from service.domain.resources.context import Context
 from service.http.conditional import is_one_of, unchanged, whole
 from service.http.middleware.authentication import Authenticator
 from service.http.middleware.request_middleware import (

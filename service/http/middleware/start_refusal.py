@@ -3,7 +3,7 @@
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from db.errors import DatabaseError
-from service.domain.keys import NoKeys
+from service.domain.access.keys import NoKeys
 
 REFUSALS = (DatabaseError, NoKeys, OSError)
 """What the one who starts the service can mend; the message says how."""

@@ -19,7 +19,7 @@ from uvicorn.config import Config
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from service.domain.networks import network_of
+from service.domain.access.networks import network_of
 from service.http.problems import BAD_REQUEST, HEADERS_TOO_LARGE, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
 from service.http.protocol import turns
 from service.http.protocol.joined_writes import JoinedWrites

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from db.records import Job, Material, StoredGraspLog
-from service.domain import curate
+from service.domain.materials import curate
 from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.conditional import IfMatch, require_match

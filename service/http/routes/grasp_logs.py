@@ -9,11 +9,25 @@ from fastapi.responses import FileResponse
 from db.records import LogFilter, StoredGraspLog
 from db.repositories import grasp_logs, materials
 from service import formats
-from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
-from service.domain.export import export
-from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHistory, decode_history, decode_samples
-from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, receive_digest, received, store
+from service.domain.logs.export import export
+from service.domain.models.stored_results import (
+    EVENT_KINDS,
+    SAMPLE_ARRAYS,
+    StoredHistory,
+    decode_history,
+    decode_samples,
+)
+from service.domain.resources.context import Context
+from service.domain.uploads.upload import (
+    ReceivedLog,
+    StoredUpload,
+    UploadRequest,
+    accept,
+    receive_digest,
+    received,
+    store,
+)
 from service.formats import writing
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks

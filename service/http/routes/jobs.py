@@ -6,8 +6,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.domain.await_job import MOST_SECONDS, await_job
-from service.domain.cancel import cancel
+from service.domain.jobs.await_job import MOST_SECONDS, await_job
+from service.domain.jobs.cancel import cancel
 from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems

@@ -8,10 +8,10 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.repositories import friction_models, materials
 from estimators.method_names import ModelMethod
-from service.domain import curate
-from service.domain.fit import request_fit
-from service.domain.look_up import look_up
-from service.domain.record_next import record_next
+from service.domain.materials import curate
+from service.domain.materials.fit import request_fit
+from service.domain.planning.look_up import look_up
+from service.domain.planning.record_next import record_next
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.conditional import NOT_MODIFIED, conditional, tagged

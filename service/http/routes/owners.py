@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from service.domain import ownership
+from service.domain.materials import ownership
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems

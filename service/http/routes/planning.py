@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter
 
-from service.domain import plan
+from service.domain.planning import plan
 from service.http.access import READ
 from service.http.bodies import LongJsonRoute
 from service.http.dependencies import CurrentContext

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Path, Request, Response
 
 from db.repositories import calibrations
 from db.repositories import sensors as stored_sensors
-from service.domain import sensors
-from service.domain.calibrate import calibrate
+from service.domain.sensors import gels
+from service.domain.sensors.calibrate import calibrate
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.dependencies import CurrentContext
@@ -115,7 +115,7 @@ def read_calibration(
 )
 def read_sensor(context: CurrentContext, name: SensorName) -> SensorOut:
     """With the mechanics of its gel, where they are known."""
-    return SensorOut.of(sensors.find(context, name))
+    return SensorOut.of(gels.find(context, name))
 
 
 @router.put(
@@ -126,4 +126,4 @@ def read_sensor(context: CurrentContext, name: SensorName) -> SensorOut:
 )
 def describe_sensor(context: CurrentContext, name: SensorName, gel: GelIn, principal: CurrentPrincipal) -> SensorOut:
     """From then on, forces of its logs that have none are reconstructed from the displacement of their markers."""
-    return SensorOut.of(sensors.describe(context, name, gel.record(), principal))
+    return SensorOut.of(gels.describe(context, name, gel.record(), principal))

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import APIRouter, WebSocket
 
 from db.blobs import Spool
-from service.domain.upload import UploadRequest, store_made
+from service.domain.uploads.upload import UploadRequest, store_made
 from service.formats.reading import Description
 from service.http.access import UPLOAD, principal
 from service.http.context import ServerContext

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
 from db.records import Material
-from service.domain.recommended import Recommended, recommended
+from service.domain.models.recommended import Recommended, recommended
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Name, Next, Reason, Reference, Text
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 from service.http.schemas.models import MODEL_EXAMPLE, FrictionModelOut

@@ -8,8 +8,8 @@ from pydantic.config import JsonDict
 
 from db.records import StoredModel
 from estimators.method_names import FitMethod
-from service.domain.look_up import Averaged, Friction, FrictionQuery
-from service.domain.stored_results import to_client_model
+from service.domain.models.stored_results import to_client_model
+from service.domain.planning.look_up import Averaged, Friction, FrictionQuery
 from service.http.schemas.common import MOMENT_EXAMPLE, Area, Body, Force, Next, Reference, Velocity
 
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from estimators.method_names import FitMethod
-from service.domain.look_up import Averaged
-from service.domain.plan import GraspTask
+from service.domain.planning.look_up import Averaged
+from service.domain.planning.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
 from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, GraspingSensor, Notes, SupportKind
 from service.http.schemas.results import SAMPLES_EXAMPLE

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import AuditFilter
 from db.repositories import access_keys, audit
-from service.domain.keys import is_valid
+from service.domain.access.keys import is_valid
 from service.http.access import ADMIN
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import StoredModel
 from db.repositories import friction_models, materials
-from service.domain.context import Context
+from service.domain.resources.context import Context
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute

@@ -7,7 +7,7 @@ from fastapi.responses import RedirectResponse
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.domain.cancel import cancel
+from service.domain.jobs.cancel import cancel
 from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute

@@ -6,9 +6,9 @@ from fastapi import APIRouter, Request, Response
 
 from db.records import Detection, StoredGraspLog
 from db.repositories import grasp_logs
-from service.domain.context import Context
-from service.domain.curate import counts_instead
 from service.domain.errors import ResultsNotReady
+from service.domain.materials.curate import counts_instead
+from service.domain.resources.context import Context
 from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext

@@ -13,9 +13,9 @@ from db.paging import Window
 from db.records import LogFilter, SampledLog, StoredModel
 from db.repositories import detections, friction_models, grasp_logs, materials
 from estimators.method_names import ModelMethod
-from service.domain import curate
-from service.domain.context import Context
 from service.domain.errors import NoModel
+from service.domain.materials import curate
+from service.domain.resources.context import Context
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext

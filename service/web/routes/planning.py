@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from estimators.method_names import METHODS
-from service.domain import plan
+from service.domain.planning import plan
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute

@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Response
 from fastapi.responses import RedirectResponse
 
-from service.domain.practice import load_practice
+from service.domain.uploads.practice import load_practice
 from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 

@@ -13,8 +13,8 @@ from db.paging import Window
 from db.records import Gel, LogFilter, Sensor, StoredGraspLog
 from db.repositories import calibrations, grasp_logs
 from db.repositories import sensors as stored_sensors
-from service.domain import sensors
-from service.domain.context import Context
+from service.domain.resources.context import Context
+from service.domain.sensors import gels
 from service.http.access import READ, UPLOAD, Access, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.paging import Page
@@ -48,7 +48,7 @@ def list_sensors(context: CurrentContext, request: Request, cursor: CursorText =
 @router.get("/sensors/{name:path}", dependencies=[READ])
 def show_sensor(context: CurrentContext, request: Request, name: SensorName, cursor: CursorText = None) -> Response:
     """One sensor with its logs; raises ``NotFound``."""
-    sensor = sensors.find(context, name)
+    sensor = gels.find(context, name)
     return render(request, "sensor.html", **_shown(context, request, sensor, cursor), fields=_typed(sensor.gel))
 
 
@@ -65,13 +65,13 @@ def describe_sensor(
 ) -> Response:
     """Describe the gel of a known sensor, and show it; raises ``NotFound``, and as the API's route does."""
     fields = dict(zip(FIELDS, (young_modulus, poisson_ratio, thickness, marker_depth), strict=True))
-    sensor = sensors.find(context, name)
+    sensor = gels.find(context, name)
     on_problem(request, "sensor.html", **_shown(context, request, sensor, None), fields=fields)
     described = checked(GelIn, {each: text.strip() for each, text in fields.items()})
     if sensor.gel is not None and sensor.gel.relative_thickness is not None:
         rows = [list(row) for row in sensor.gel.relative_thickness]
         described = revised(GelIn, described.model_dump() | {"relative_thickness": rows})
-    sensors.describe(context, name, described.record(), principal)
+    gels.describe(context, name, described.record(), principal)
     return RedirectResponse(f"/sensors/{quote(name, safe='')}", 303)
 
 

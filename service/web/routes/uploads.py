@@ -10,10 +10,10 @@ from starlette.datastructures import FormData, UploadFile
 
 from db.blobs import disk_errors_named
 from service import formats
-from service.domain.context import Context
-from service.domain.principal import Principal
-from service.domain.receive import CHUNK_BYTES
-from service.domain.upload import UploadRequest, upload
+from service.domain.access.principal import Principal
+from service.domain.resources.context import Context
+from service.domain.resources.receive import CHUNK_BYTES
+from service.domain.uploads.upload import UploadRequest, upload
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import limited

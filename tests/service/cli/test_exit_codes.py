@@ -17,7 +17,7 @@ from service.cli.exit_codes import (
     exit_code,
     message,
 )
-from service.domain.keys import NoKeys
+from service.domain.access.keys import NoKeys
 from service.settings import Settings
 from slipcore.errors import InvalidInput, NoForces
 from stiction_client import ConnectionFailed, InvalidArgument, NoFeasibleForce

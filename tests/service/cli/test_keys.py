@@ -9,7 +9,7 @@ from db.database import Database
 from db.repositories import access_keys
 from service import cli
 from service.cli.exit_codes import INPUT_REFUSED
-from service.domain.keys import is_key
+from service.domain.access.keys import is_key
 
 Capture = pytest.CaptureFixture[str]
 

@@ -13,7 +13,7 @@ import typer
 from service.cli import inputs, local, options
 from slipcore import ContactFriction, GraspLog, InvalidInput
 from slipcore.forces.reconstruction.comparison import Agreement, ForceComparison
-from tests.service.domain.test_doubtful_logs import MODEL
+from tests.service.domain.logs.test_doubtful_logs import MODEL
 
 Capture = pytest.CaptureFixture[str]
 

@@ -24,7 +24,7 @@ from db.database import Database
 from db.records import Claim
 from db.repositories import jobs
 from db.tables import JobRow
-from service.domain import upload
+from service.domain.uploads import upload
 from service.jobs import executors, worker
 from service.settings import Settings
 from slipcore import GraspLog

@@ -20,8 +20,8 @@ from db.repositories import access_keys, audit, grasp_logs
 from db.tables import now
 from service import cli
 from service.cli.durations import moment_to_come
-from service.domain import keys
-from service.domain.keys import NoKeys, check_start
+from service.domain.access import keys
+from service.domain.access.keys import NoKeys, check_start
 from service.http.middleware import authentication
 from service.settings import Settings
 

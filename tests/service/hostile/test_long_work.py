@@ -12,7 +12,7 @@ import pytest
 
 from db import blobs
 from db.repositories import jobs
-from service.domain import upload
+from service.domain.uploads import upload
 from service.http import bodies
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)

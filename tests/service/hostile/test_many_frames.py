@@ -6,7 +6,7 @@ import pytest
 
 import slipcore
 from service import formats
-from service.domain.stored_results import encode_history, encode_samples, summarise_history, summarise_samples
+from service.domain.models.stored_results import encode_history, encode_samples, summarise_history, summarise_samples
 from slipcore import GraspLog
 from stiction_client import container
 

@@ -9,7 +9,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import materials
-from service.domain import keys
+from service.domain.access import keys
 
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 FORBIDDEN, OK = httpx.codes.FORBIDDEN, httpx.codes.OK

@@ -11,9 +11,11 @@ import pytest
 from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
-from service.domain import curate, keys, ownership, upload
+from service.domain.access import keys
+from service.domain.access.principal import Principal
 from service.domain.errors import DomainError
-from service.domain.principal import Principal
+from service.domain.materials import curate, ownership
+from service.domain.uploads import upload
 from service.formats.reading import Description
 
 HEADERS = {"content-type": "application/vnd.stiction.grasp-log+npz"}

@@ -12,11 +12,12 @@ from db.database import Database
 from db.records import Gel, NewCalibration
 from db.repositories import calibrations, materials, sensors
 from db.tables import MaterialRow
-from service.domain import calibrate, curate, quotas
-from service.domain import sensors as sensor_cases
-from service.domain.context import Context
+from service.domain.access import quotas
+from service.domain.access.principal import Principal
 from service.domain.errors import InsufficientScope
-from service.domain.principal import Principal
+from service.domain.materials import curate
+from service.domain.resources.context import Context
+from service.domain.sensors import calibrate, gels
 from service.settings import Settings
 
 GEL, ANOTHER = Gel(2.5e5, 0.48, None, 0.0), Gel(1e6, 0.49, 4e-3, 1e-3)
@@ -65,11 +66,11 @@ def pass_on(done: Future[Any], end: Future[Any]) -> None:
 
 
 def test_a_new_sensor_is_described_by_one_of_two(context: Context, second: Second) -> None:
-    late = second(quotas, "check_change", lambda: sensor_cases.describe(context, "s", ANOTHER, SOMEBODY))
-    assert sensor_cases.describe(context, "s", GEL, SOMEBODY).gel == GEL
+    late = second(quotas, "check_change", lambda: gels.describe(context, "s", ANOTHER, SOMEBODY))
+    assert gels.describe(context, "s", GEL, SOMEBODY).gel == GEL
     with pytest.raises(InsufficientScope):
         late.result(TIMEOUT)
-    assert sensor_cases.find(context, "s").gel == GEL
+    assert gels.find(context, "s").gel == GEL
 
 
 def test_a_sensor_is_calibrated_by_one_of_two(context: Context, second: Second) -> None:

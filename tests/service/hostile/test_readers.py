@@ -11,7 +11,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
 from service.formats import reading
 from service.processes import fair_queue
 from service.settings import Settings

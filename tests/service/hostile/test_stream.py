@@ -24,8 +24,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewModel
 from db.repositories import friction_models, jobs, materials
-from service.domain.model_cache import ModelCache
-from service.domain.principal import Principal
+from service.domain.access.principal import Principal
+from service.domain.models.model_cache import ModelCache
 from service.processes.fair_threads import FairThreads
 from service.settings import Settings
 from service.stream import connection, detectors, errors, sessions

@@ -6,7 +6,7 @@ from fastapi.staticfiles import StaticFiles
 
 from db.records import AccessKey, Scope
 from service.app import create_app
-from service.domain import keys
+from service.domain.access import keys
 from service.http import access
 from service.http.access import READ, Access
 from service.settings import Settings

@@ -10,7 +10,8 @@ from sqlalchemy import event
 from db.database import Database
 from db.paging import Window
 from db.repositories import jobs
-from service.domain import curate, model_cache
+from service.domain.materials import curate
+from service.domain.models import model_cache
 from service.http.conditional import conditional, is_one_of, tagged
 
 PATHS = ("/v1/materials/paper", "/v1/materials/paper/friction?fn=0.05")

@@ -13,7 +13,7 @@ from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import access_keys, grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
-from service.domain import keys
+from service.domain.access import keys
 from service.http.idempotency import IdempotencyKey, RepeatableResponse, respond_once
 from service.http.middleware import authentication
 from tests.forking import Context

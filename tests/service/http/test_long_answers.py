@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
 
-from service.domain.principal import Principal
+from service.domain.access.principal import Principal
 from service.http import context, long_answers
 from service.http.descriptions import description_of, problems
 from service.http.problems import INVALID_REQUEST, INVALID_SAMPLES, NO_MODEL

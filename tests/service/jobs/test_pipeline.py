@@ -19,13 +19,11 @@ from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, Stored
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners, sensors
 from db.tables import DetectionRow, GraspLogRow, JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments, ScatterPrior
-from service.domain.collect_friction import collect
-from service.domain.look_up import FrictionQuery, look_up
-from service.domain.model_cache import KnownModel
-from service.domain.recommended import recommended
-from service.domain.same_grasp import find_alike
-from service.domain.sensors import NAMELESS
-from service.domain.stored_results import (
+from service.domain.logs.collect_friction import collect
+from service.domain.logs.same_grasp import find_alike
+from service.domain.models.model_cache import KnownModel
+from service.domain.models.recommended import recommended
+from service.domain.models.stored_results import (
     SAMPLE_ARRAYS,
     decode_samples,
     encode_samples,
@@ -33,7 +31,9 @@ from service.domain.stored_results import (
     to_client_model,
     to_friction_model,
 )
-from service.domain.surface_change import MARK
+from service.domain.models.surface_change import MARK
+from service.domain.planning.look_up import FrictionQuery, look_up
+from service.domain.sensors.names import NAMELESS
 from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct

@@ -13,7 +13,7 @@ from sqlalchemy import text
 
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
 from service.observability import logs
 from service.observability.logs import JsonLines, Logs, TextLines
 from service.serving import configuration

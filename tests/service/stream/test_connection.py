@@ -23,7 +23,7 @@ from websockets.sync.client import ClientConnection, connect
 from db import migrate
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
 from service.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream

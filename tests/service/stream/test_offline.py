@@ -12,9 +12,9 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
+from service.domain.access.principal import Principal
 from service.domain.errors import KeyEnded
-from service.domain.principal import Principal
 from service.processes.fair_threads import SHORT_AT_ONCE, FairThreads
 from service.settings import Settings
 from service.stream import connection

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.domain.reconstruct import CONTRADICTED
+from service.domain.sensors.reconstruct import CONTRADICTED
 from service.formats import read
 from service.stream import detectors, reconstructing
 from service.stream.detectors import PackedFrame

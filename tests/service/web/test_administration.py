@@ -8,7 +8,7 @@ import pytest
 from db.database import Database
 from db.records import Actor
 from db.repositories import access_keys, audit
-from service.domain import keys
+from service.domain.access import keys
 from tests.service.web.conftest import HOSTILE
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)

@@ -3,7 +3,7 @@ import re
 import numpy as np
 import pytest
 
-from service.domain.plan import ForceCurve
+from service.domain.planning.plan import ForceCurve
 from service.web.charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Curve, draw, draw_together, points, ticks
 from service.web.force_curve import draw_forces, probabilities
 

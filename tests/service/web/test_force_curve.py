@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from service.domain.plan import ForceCurve
+from service.domain.planning.plan import ForceCurve
 from service.web.charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH
 from service.web.force_curve import draw_forces, probabilities
 

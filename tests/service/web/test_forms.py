@@ -15,7 +15,7 @@ from starlette.datastructures import UploadFile
 from starlette.formparsers import MultiPartParser
 
 from estimators.method_names import METHODS
-from service.domain import upload
+from service.domain.uploads import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
 from service.web import forms

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import slipcore
-from service.domain import stored_results
+from service.domain.models import stored_results
 from service.formats.lattice import lattice_axes
 from service.web import frames
 from slipcore import GraspLog, SlipHistory

@@ -10,7 +10,7 @@ import pytest
 from db.database import Database
 from db.repositories import access_keys
 from service.demo import inputs
-from service.domain import keys
+from service.domain.access import keys
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client.stream import SlipStream

@@ -8,7 +8,7 @@ from starlette.requests import HTTPConnection
 
 from db.database import Database
 from db.repositories import access_keys
-from service.domain import keys
+from service.domain.access import keys
 from service.http.middleware import authentication
 from service.http.problems import STORAGE_UNAVAILABLE, Problem
 from service.stream.messages import Open

@@ -10,7 +10,7 @@ from scipy import stats
 import estimators
 from db.records import NewModel, SampledLog, SamplesOfLog, StoredModel
 from estimators import Moments
-from service.domain.stored_results import to_friction_model, to_new_model
+from service.domain.models.stored_results import to_friction_model, to_new_model
 from service.web.grasp_effects import differing, draw_effects
 from service.web.posterior import Density, densities, pairs
 from tests.service.web.test_samples import grasp

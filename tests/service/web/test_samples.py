@@ -9,7 +9,7 @@ import pytest
 
 import estimators
 from db.records import NewModel
-from service.domain.stored_results import to_new_model
+from service.domain.models.stored_results import to_new_model
 from service.web import samples
 from slipcore.samples import FrictionSamples
 from tests.service.web.test_frames import unpacked

@@ -10,7 +10,7 @@ from starlette.requests import cookie_parser
 
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
-from service.domain import keys
+from service.domain.access import keys
 from service.http import sessions
 from service.http.middleware import authentication
 from tests.service.web.conftest import HTML

@@ -13,8 +13,8 @@ from starlette.requests import HTTPConnection
 from db.database import Database
 from db.repositories import access_keys
 from service.app import create_app
-from service.domain import keys
-from service.domain.keys import SCOPES, NoKeys, check_start
+from service.domain.access import keys
+from service.domain.access.keys import SCOPES, NoKeys, check_start
 from service.http import access
 from service.http.middleware import authentication
 from service.settings import Settings

@@ -7,8 +7,8 @@ import pytest
 from db.database import Database
 from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
-from service.domain import keys
-from service.domain.model_cache import ModelCache
+from service.domain.access import keys
+from service.domain.models.model_cache import ModelCache
 from service.http.middleware import lookups
 from service.http.middleware.lookups import Lookups
 from service.http.routes import materials as route

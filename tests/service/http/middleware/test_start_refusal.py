@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from db.errors import StorageUnavailable
-from service.domain.keys import NoKeys
+from service.domain.access.keys import NoKeys
 from service.http.middleware.start_refusal import StartRefusal
 
 

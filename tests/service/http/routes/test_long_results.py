@@ -13,8 +13,8 @@ import pytest
 from fastapi import FastAPI
 
 import slipcore
-from service.domain.principal import Principal
-from service.domain.stored_results import encode_history
+from service.domain.access.principal import Principal
+from service.domain.models.stored_results import encode_history
 from service.http.access import principal
 from service.http.dependencies import server_context
 from service.http.long_answers import LONG_ANSWER

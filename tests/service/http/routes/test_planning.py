@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from db.records import NewModel, StoredModel
-from service.domain import plan
+from service.domain.planning import plan
 from slipcore import GraspLog
 from stiction_client import FrictionClient, Scale, SensorFriction, SensorScale, grasp, required_normal_force
 from stiction_client.container import encode

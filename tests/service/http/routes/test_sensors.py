@@ -16,10 +16,10 @@ from db.database import Database
 from db.records import Gel, NewCalibration
 from db.repositories import calibrations, detections, grasp_logs, jobs, materials, runners, sensors
 from db.tables import DetectionRow, JobRow
-from service.domain import keys
-from service.domain.calibrate import OFFSET, Correction, corrected, correction_findings
-from service.domain.reconstruct import RECONSTRUCTED
-from service.domain.sensors import NAMELESS
+from service.domain.access import keys
+from service.domain.sensors.calibrate import OFFSET, Correction, corrected, correction_findings
+from service.domain.sensors.names import NAMELESS
+from service.domain.sensors.reconstruct import RECONSTRUCTED
 from service.jobs import pipeline
 from service.stream import messages
 from slipcore import GraspLog, calibrate_sensor, frames

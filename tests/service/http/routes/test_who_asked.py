@@ -6,7 +6,7 @@ import pytest
 from db.database import Database
 from db.records import Detection, SampleSummary
 from db.repositories import access_keys, detections, grasp_logs
-from service.domain import keys
+from service.domain.access import keys
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 DETECTION = Detection("filter", 1e-6, 0.1, 60, 3, 4, 3, 4, 4, 0.05, "1" * 64)

@@ -1,0 +1,1 @@
+"""What is found in a log of a grasp, and what is handed out of it."""

@@ -1,0 +1,1 @@
+"""Materials: their names, owners, logs that count, and fits."""

@@ -1,0 +1,1 @@
+"""Friction models: stored and read again, kept in memory, chosen among and compared."""

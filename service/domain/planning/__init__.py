@@ -1,0 +1,1 @@
+"""Answers to a planner: friction, material, grip force, and what to record next."""

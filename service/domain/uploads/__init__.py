@@ -1,0 +1,1 @@
+"""How logs come in: taken from the wire, looked at, and stored with their job."""
