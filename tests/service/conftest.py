@@ -24,6 +24,7 @@ from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
 from service.app import create_app
 from service.domain.access import keys
+from service.domain.jobs.await_job import MOST_SECONDS
 from service.domain.models.model_cache import ModelCache
 from service.http.context import ServerContext
 from service.jobs import worker
@@ -237,11 +238,11 @@ def upload() -> Callable[..., httpx.Response]:
 def wait() -> Callable[[httpx.Client, str], Members]:
     def until_finished(client: httpx.Client, job_id: str) -> Members:
         deadline = time.monotonic() + 60.0
-        while time.monotonic() < deadline:
-            job: Members = client.get(f"/v1/jobs/{job_id}").raise_for_status().json()
+        while time.monotonic() < deadline:  # an answer at the end: who asks again and again keeps two threads busy
+            asked = client.get(f"/v1/jobs/{job_id}", params={"wait": MOST_SECONDS}, timeout=60.0)
+            job: Members = asked.raise_for_status().json()
             if job["finished_at"] is not None:
                 return job
-            time.sleep(0.01)
         raise AssertionError(f"job {job_id} does not end: {job}")
 
     return until_finished
