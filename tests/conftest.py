@@ -1,6 +1,5 @@
 """A real PostgreSQL server, and a store like S3, for whoever asks for them."""
 
-import asyncio
 import gc
 import os
 import re
@@ -29,6 +28,7 @@ from db import migrate
 from db.database import Database
 from db.records import Claim
 from db.repositories import jobs, runners
+from tests import prompt_ends
 from tests.migrations import Remembered
 
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)  # the same cases in each run
@@ -91,10 +91,8 @@ def migrations() -> Iterator[Remembered]:
 
 @pytest.fixture(scope="session", autouse=True)
 def prompt_servers() -> Iterator[None]:
-    """uvicorn looks ten times a second whether it shall end, and waits a tenth more then; the tests end hundreds."""
-    hurried = SimpleNamespace(**vars(asyncio) | {"sleep": lambda seconds: asyncio.sleep(seconds / 20.0)})
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("uvicorn.server.asyncio", hurried)
+        prompt_ends.patch(patched)
         yield
 
 
