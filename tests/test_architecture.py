@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -48,11 +49,40 @@ NUMERICS = {"numba", "scipy", "statsmodels", "emcee", "pandas"}
 """What the server process does without until a request needs it: half of its memory, and half of its start."""
 
 
+@dataclass
+class Nodes:
+    """What the rules here look at in a file, wherever in it."""
+
+    imports: list[ast.Import | ast.ImportFrom]
+    classes: list[tuple[str, int]]
+    """Each with its line."""
+    functions: dict[str, list[ast.arg]]
+    """What each is given, by line and name."""
+    attributes: set[tuple[str, str]]
+    """Of names."""
+
+
 @cache
+def nodes_of(path: Path) -> Nodes:
+    """Read once, for all rules: the trees of all files together would be too large to keep."""
+    found = Nodes([], [], {}, set())
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.Import() | ast.ImportFrom():
+                found.imports.append(node)
+            case ast.ClassDef():
+                found.classes.append((node.name, node.lineno))
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                given = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+                found.functions[f"{node.lineno} {node.name}"] = [*given]
+            case ast.Attribute(value=ast.Name()):
+                found.attributes.add((node.value.id, node.attr))
+    return found
+
+
 def import_statements(path: Path) -> list[ast.Import | ast.ImportFrom]:
     """At the top of a file, inside of functions, and for types only."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    return nodes_of(path).imports
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -113,6 +143,7 @@ def circle(graph: Mapping[str, Collection[str]]) -> list[str]:
     return []
 
 
+@cache
 def third_party(path: Path) -> set[str]:
     return {name.split(".")[0] for name in imported_modules(path)} - set(sys.stdlib_module_names)
 
@@ -185,16 +216,9 @@ def client_parts(path: Path) -> set[str]:
     """The modules of the client that a file uses, by the names of the package as well."""
     import stiction_client
 
-    if "stiction_client" not in (text := path.read_text(encoding="utf-8")):
-        return set()
-    tree = ast.parse(text)
     nodes = [node for node in import_statements(path) if isinstance(node, ast.ImportFrom)]
     names = {alias.name for node in nodes if node.module == "stiction_client" for alias in node.names}
-    names |= {
-        node.attr
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "stiction_client"
-    }
+    names |= {name for owner, name in nodes_of(path).attributes if owner == "stiction_client"}
     submodules = {module.stem for module in (ROOT / CLIENT).iterdir()}
     homes = {name if name in submodules else getattr(stiction_client, name).__module__.split(".")[1] for name in names}
     return (
@@ -645,9 +669,9 @@ def classes_of_one_name(paths: Collection[Path]) -> dict[str, list[str]]:
     """The public classes that some files define more than once between them, each with where."""
     found = defaultdict[str, list[str]](list)
     for path in paths:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found[node.name].append(f"{path}:{node.lineno}")
+        for name, line in nodes_of(path).classes:
+            if not name.startswith("_"):
+                found[name].append(f"{path}:{line}")
     return {name: places for name, places in found.items() if len(places) > 1}
 
 
@@ -671,15 +695,9 @@ MOST_PARAMETERS = 8
 
 def parameters(path: Path) -> dict[str, list[ast.arg]]:
     """What each function of a file is given, but for the object or class that it belongs to."""
-    return {
-        f"{path}:{node.lineno} {node.name}": [
-            argument
-            for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
-            if argument.arg not in {"self", "cls"}
-        ]
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-    }
+    own = {"self", "cls"}
+    functions = nodes_of(path).functions.items()
+    return {f"{path}:{name}": [each for each in given if each.arg not in own] for name, given in functions}
 
 
 WIDE = {
