@@ -335,7 +335,7 @@ class RobustSettings(Options):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings(Options):
     """Errors that samples share (``linear/``: ``cluster_errors``, ``shared_errors``, ``observations``,
-    ``grasp_statistics``, ``within_places``, ``place_correlation``, ``slopes_of_grasps``).
+    ``grasp_statistics``, ``within_places``, ``lasting_errors``, ``place_correlation``, ``slopes_of_grasps``).
     """
 
     few: Annotated[int, Option(1, 100, "clusters", "9 for the three coefficients")] = 3
@@ -350,6 +350,8 @@ class ClusterSettings(Options):
     """That the record of a single element, or of a grasp, is cut into."""
     by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual for what differs from chance")] = 2.0
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
+    independent: Annotated[float, Option(0.01, 0.99, "-", "as likely as not")] = 0.5
+    """Probability, before a record of one place is seen, that none of its errors last."""
     least_neighbours: Annotated[int, Option(2, 1000, "pairs", "a correlation to 0.25")] = 16
     """Of places of a grasp beside each other, from which they show whether neighbours are off alike."""
     most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact shows")] = 0.99
@@ -515,6 +517,10 @@ class InfluenceSettings(Options):
     """Of least friction that are left out in turn."""
 
 
+LASTING = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+"""How long errors of a record last, in its stretches of time: from none to the next, to three records."""
+OWN_SHARES = (0.0, 0.25, 0.5, 0.75)
+"""Part of their variance that each stretch has for itself."""
 STEP_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001)
 """Shares of a Newton step that Laplace's approximation tries at once: trials on skewed posteriors."""
 WEIGHT_POWERS = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02)

@@ -47,6 +47,7 @@ ENTRIES = {
         "many_elements",
         "tried on the tuning scenes; docs/sensors.md says how far F1 changes",
     ),
+    "estimators.CLUSTERS": ("independent", "of records of one place, which the page's grasps are not"),
     "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (

@@ -60,6 +60,14 @@ class FitData:
         """Weighted mean of μ."""
         return float(self.factor.mean[-1])
 
+    @property
+    def of_one_record(self) -> bool:
+        """Whether all samples are known to be of one grasp at one place: nothing else has errors of its own."""
+        if self.observations is not None:
+            return self.cluster_kind == "time block"
+        grasps = [grasp for block in self.blocks for grasp in block.grasps]
+        return self.cluster_kind == "none" and len(grasps) == 1 and grasps[0].of_one_place
+
     def centred_rows(self) -> FloatArray:
         """Four rows a grasp, [g, 4, 4], in (1, v, f_n, μ) about the common mean, with all its sums of squares."""
         whole = self.blocks[0].merge(*self.blocks[1:])
@@ -77,8 +85,10 @@ class FitData:
     def grasp_statistics(self) -> tuple[GraspStatistics, ...]:
         """Each grasp place by place; moments that know of no places count as those of one."""
         if self.observations is not None:
-            return _statistics_of_samples(self.observations)
-        return tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
+            grasps = _statistics_of_samples(self.observations)
+        else:
+            grasps = tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
+        return tuple(grasp.by_itself for grasp in grasps) if self.of_one_record else grasps
 
     def kept(self, rows: NDArray[np.bool_]) -> "FitData":
         """The data of some of the samples only."""
@@ -159,18 +169,15 @@ def _unit(whole: SufficientStatistics) -> float:
 
 def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics, ...]:
     values, order = observations.columns(), np.argsort(observations.grasp, kind="stable")
-    place = observations.cluster if observations.cluster_kind == "time block" else observations.element
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
-    return tuple(_statistics_of_grasp(observations, values, place, rows) for rows in np.split(order, ends))
+    return tuple(_statistics_of_grasp(observations, values, rows) for rows in np.split(order, ends))
 
 
-def _statistics_of_grasp(
-    observations: Observations, values: FloatArray, place: IntArray, rows: IntArray
-) -> GraspStatistics:
+def _statistics_of_grasp(observations: Observations, values: FloatArray, rows: IntArray) -> GraspStatistics:
     columns = Columns(
         values[rows],
         observations.weight[rows],
-        codes_of(place[rows]),
+        codes_of(observations.element[rows]),
         observations.time[rows],
         observations.element[rows],
     )

@@ -1,6 +1,7 @@
 """Mergeable statistics of a grasp by place: what the model of scatter between grasps, places and samples needs."""
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -19,8 +20,9 @@ IntArray = NDArray[np.int64]
 
 HEADER = struct.Struct("<2I8d")
 SHARE = struct.Struct("<d")
-POOLED, UNKNOWN, ALIKE = 1, 2, 4
-"""Flags in its second number: places in groups, velocity unknown, and a share of places behind it."""
+TRIANGLE = struct.Struct("<6d")
+POOLED, UNKNOWN, ALIKE, ALONE = 1, 2, 4, 8
+"""Flags in its second number: places in groups, velocity unknown; behind it a share of places, and a triangle."""
 UPPER = np.triu_indices(3)
 NO_NOISE = np.zeros(2)
 
@@ -44,7 +46,8 @@ class GraspStatistics:
     Groups [g] of places: ``count`` places of about the same ``weight`` Σw each, the weighted ``mean`` [g, 3] of
     (v, f_n, μ), and the triangular factor ``spread`` [g, 3, 3] of the places' means about it, which is zero where a
     group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places,
-    freed of noise and of errors that go together.
+    freed of noise and of errors that go together; ``alone`` the same of one place without another grasp to compare its
+    slopes with, whose errors may last for longer than shows by itself (``lasting_errors``); None of several places.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
     that relative to what seems to stick, and counts as 0. ``share``: the part of the places that they count as, where
     neighbours are off alike (``place_correlation``). ``sensor``: the name of the grasp's sensor, "" where it is not
@@ -63,6 +66,12 @@ class GraspStatistics:
     velocity_unknown: bool = False
     share: float = 1.0
     sensor: str = ""
+    alone: FloatArray | None = None
+
+    @property
+    def by_itself(self) -> "GraspStatistics":
+        """The same where no other grasp is there."""
+        return self if self.alone is None else replace(self, within=self.alone)
 
     @property
     def independent(self) -> FloatArray:
@@ -89,7 +98,9 @@ class GraspStatistics:
         sums = np.bincount(place, weight).astype(float)
         mean = np.stack([np.bincount(place, weight * column) for column in offset.T], axis=1) / sums[:, None]
         left = weight.sum() * max(1.0 - len(sums) / len(weight), 0.0)
-        within = within_places(values, offset - mean[place], weight, time, noise * np.sqrt(left))
+        deviates = values, offset - mean[place], weight, time, noise * np.sqrt(left)
+        within = within_places(*deviates)
+        alone = within_places(*deviates, alone=True) if len(sums) == 1 else None
         share = 1.0
         if element is not None and left > 0.0:
             label = np.zeros(len(sums), dtype=np.int64)
@@ -106,18 +117,21 @@ class GraspStatistics:
             weight_square=float(weight @ weight),
             velocity_unknown=velocity_unknown,
             share=share,
+            alone=alone,
         )
 
     def scaled(self, normal_force: float) -> "GraspStatistics":
         """The same with all f_n times a factor, as on elements of another area."""
         factor = np.array([1.0, normal_force, 1.0])
-        return replace(self, mean=self.mean * factor, spread=self.spread * factor, within=self.within * factor)
+        alone = None if self.alone is None else self.alone * factor
+        mean, spread, within = (part * factor for part in (self.mean, self.spread, self.within))
+        return replace(self, mean=mean, spread=spread, within=within, alone=alone)
 
     def to_bytes(self) -> bytes:
         """These statistics in little-endian doubles, less than 16 kB."""
         pooled = bool((self.count > 1.0).any())
         alike = self.share < 1.0
-        flags = POOLED * pooled | UNKNOWN * self.velocity_unknown | ALIKE * alike
+        flags = POOLED * pooled | UNKNOWN * self.velocity_unknown | ALIKE * alike | ALONE * (self.alone is not None)
         header = HEADER.pack(
             len(self.count), flags, self.total_weight, self.weight_square, *(float(x) for x in self.within[UPPER])
         )
@@ -125,6 +139,7 @@ class GraspStatistics:
         if pooled:
             columns += [self.count[:, None], self.spread[:, UPPER[0], UPPER[1]]]
         header += SHARE.pack(self.share) if alike else b""
+        header += b"" if self.alone is None else TRIANGLE.pack(*(float(x) for x in self.alone[UPPER]))
         return header + np.concatenate(columns, axis=1).astype("<f8").tobytes()
 
     @classmethod
@@ -134,19 +149,28 @@ class GraspStatistics:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"at least {HEADER.size} bytes")
         groups, flags, total, square, *within = HEADER.unpack_from(content)
         pooled, unknown = bool(flags & POOLED), bool(flags & UNKNOWN)
-        width, start = 11 if pooled else 4, HEADER.size + SHARE.size * bool(flags & ALIKE)
-        end = start + 8 * width * groups
-        if flags > POOLED | UNKNOWN | ALIKE or len(content) < end:
+        width, start = 11 if pooled else 4, HEADER.size
+        sizes = SHARE.size * bool(flags & ALIKE), TRIANGLE.size * bool(flags & ALONE)
+        end = start + sum(sizes) + 8 * width * groups
+        if flags > POOLED | UNKNOWN | ALIKE | ALONE or len(content) < end:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"{end} bytes for {groups} groups")
-        table = np.frombuffer(content[start:end], "<f8").reshape(groups, width).astype(float)
-        share = SHARE.unpack_from(content, HEADER.size)[0] if flags & ALIKE else 1.0
-        _check(table, total, square, within, share)
-        triangle, spread = np.zeros((3, 3)), np.zeros((groups, 3, 3))
-        triangle[UPPER] = within
+        table = np.frombuffer(content[start + sum(sizes) : end], "<f8").reshape(groups, width).astype(float)
+        share = SHARE.unpack_from(content, start)[0] if flags & ALIKE else 1.0
+        alone = TRIANGLE.unpack_from(content, start + sizes[0]) if flags & ALONE else ()
+        _check(table, total, square, [*within, *alone], share)
+        spread = np.zeros((groups, 3, 3))
         count = table[:, 4] if pooled else np.ones(groups)
         if pooled:
             spread[:, UPPER[0], UPPER[1]] = table[:, 5:]
-        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square, unknown, share), content[end:]
+        found = cls(count, table[:, 0], table[:, 1:4], spread, _triangle(within), total, square, unknown, share)
+        return replace(found, alone=_triangle(alone) if alone else None), content[end:]
+
+
+def _triangle(upper: Sequence[float]) -> FloatArray:
+    """The triangular matrix [3, 3] of its six entries, row by row."""
+    triangle = np.zeros((3, 3))
+    triangle[UPPER] = upper
+    return triangle
 
 
 def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -69,6 +69,8 @@ def test_bytes_bring_back_all_and_stay_below_16_kb(places: int) -> None:
     assert rest == b"more"
     for name in ("count", "weight", "mean", "spread", "within", "total_weight", "weight_square"):
         np.testing.assert_array_equal(getattr(back, name), getattr(grasp, name), err_msg=name)
+    assert (grasp.alone is not None) == (back.alone is not None) == (places == 1)
+    np.testing.assert_array_equal(back.by_itself.within, grasp.by_itself.within)
 
 
 @pytest.mark.parametrize("spoil", [lambda c: c[:50], lambda c: c[:-1], lambda c: c[:-8] + b"\xff" * 8])
@@ -115,3 +117,19 @@ def test_the_noise_that_samples_carry_is_taken_out_of_every_fit(samples: Make) -
     assert abs(told.coefficients[2] + 0.8) < 4.0 * told.standard_errors[2]
     assert abs(unaware.coefficients[2] + 0.8) > 6.0 * unaware.standard_errors[2]  # half of the slope
     np.testing.assert_allclose(kept.coefficients, told.coefficients, rtol=1e-7)
+
+
+def test_what_one_place_says_by_itself_is_kept_and_left_out_beside_another_grasp(samples: Make) -> None:
+    record = replace(samples(400, noise=np.cumsum(np.random.default_rng(0).standard_normal(400)), scale=0.002))
+    record = replace(record, element=np.zeros(400, dtype=np.int64), time=np.arange(400) / 60.0)
+    moments = Moments.from_samples(record)
+    grasp = moments.grasps[0]
+    assert grasp.alone is not None
+    assert np.linalg.norm(grasp.alone[:2, :2]) < 0.5 * np.linalg.norm(grasp.within[:2, :2])
+    doubled = moments.at_element_area(2.0 * moments.element_area).grasps[0]
+    assert doubled.alone is not None
+    np.testing.assert_allclose(doubled.alone, grasp.alone * [1.0, 2.0, 1.0], rtol=1e-12)
+    before = replace(moments, grasps=(replace(grasp, alone=None),))  # as an older version stored it
+    for others, alike in (([], False), ([Moments.from_samples(samples(400, seed=1))], True)):
+        ours, older = (estimators.fit([each, *others], method="hierarchical") for each in (moments, before))
+        assert np.allclose(ours.covariance, older.covariance, rtol=1e-12) == alike

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import estimators
+from benchmarks.estimators import lasting_errors
 from estimators.linear.within_places import calibrated, within_places
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
-QUIET = np.zeros(2)
+QUIET, ALIKE = np.zeros(2), np.ones(400)
 PLACES, MOMENTS = 12, 100
 
 
@@ -122,3 +123,56 @@ def test_the_order_of_samples_is_that_of_their_times(samples: Make) -> None:
     shuffled = replace(data, **{name: getattr(data, name)[order] for name in data.arrays()})
     ours, theirs = (estimators.fit(each, method="hierarchical") for each in (data, shuffled))
     np.testing.assert_allclose(ours.covariance, theirs.covariance, rtol=1e-8)
+
+
+@pytest.mark.parametrize("lasting", [0.98, 0.995], ids=["an eighth", "half"])
+def test_slopes_of_one_record_allow_for_errors_that_last_for_a_part_of_it(lasting: float) -> None:
+    held = []
+    for seed in range(40):
+        record = lasting_errors.grasp(np.random.default_rng(seed), 1, lasting)
+        low, high = estimators.fit(estimators.Moments.from_samples(record), method="hierarchical").interval().T
+        held.append((low <= lasting_errors.LAW) & (high >= lasting_errors.LAW))
+    assert (np.mean(held, axis=0) >= 0.85).all()  # of 95 %; 0.4 to 0.6, were stretches of time independent
+
+
+@pytest.mark.parametrize("lasting", [0.0, 0.995], ids=["independent", "lasting"])
+def test_one_record_of_one_place_and_its_moments_say_the_same(lasting: float) -> None:
+    record = lasting_errors.grasp(np.random.default_rng(0), 1, lasting)
+    samples, moments = (
+        estimators.fit(each, "hierarchical") for each in (record, estimators.Moments.from_samples(record))
+    )
+    np.testing.assert_allclose(samples.coefficients, moments.coefficients, rtol=1e-9)
+    np.testing.assert_allclose(samples.covariance, moments.covariance, rtol=1e-6)
+
+
+def one_place(error: np.ndarray, slope: float = 20.0) -> np.ndarray:
+    """Of a record in which velocity steps from 2 to 4 mm/s half way, and the force wanders by itself."""
+    rng = np.random.default_rng(5)
+    v, f_n = np.repeat([2e-3, 4e-3], len(error) // 2), 0.1 + 0.01 * rng.standard_normal(len(error))
+    values = np.stack([v, f_n, 0.4 + slope * v + error], axis=-1)
+    return within_places(values, values - values.mean(axis=0), ALIKE, np.arange(400.0), QUIET, alone=True)
+
+
+def test_a_step_of_velocity_in_one_record_stays_as_large_and_shows() -> None:
+    """Errors that wander for a tenth of the record, of a tenth of what the step changes."""
+    white = np.random.default_rng(1).standard_normal(400)
+    wander = np.convolve(white, np.exp(-np.arange(200) / 40.0), mode="full")[:400]
+    found = one_place(0.004 * wander / wander.std())
+    slope = slopes(found)[0]
+    error = found[2, 2] / np.sqrt(400) * np.sqrt(np.linalg.inv(found[:2, :2].T @ found[:2, :2])[0, 0])
+    assert slope == pytest.approx(20.0, abs=3.0 * error)
+    assert 2.5 * error < slope < 40.0 * error  # were all samples independent, 100 errors
+
+
+def test_independent_errors_of_one_place_cost_a_step_half_its_information() -> None:
+    """Errors that last put each half of the record off, which twenty stretches do not quite rule out."""
+    errors = 0.02 * np.random.default_rng(0).standard_normal((50, 400))
+    whole = np.linalg.det(one_place(np.zeros(400))[:2, :2])
+    shares = [np.linalg.det(one_place(error)[:2, :2]) / whole for error in errors]
+    assert 0.4 < np.median(np.square(shares)) < 0.6
+
+
+def test_a_record_too_short_for_lasting_errors_counts_its_stretches() -> None:
+    values = np.random.default_rng(0).standard_normal((5, 3))
+    args = (values, values - values.mean(axis=0), np.ones(5), np.arange(5.0), QUIET)
+    np.testing.assert_array_equal(within_places(*args, alone=True), within_places(*args))
