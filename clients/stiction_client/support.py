@@ -35,8 +35,11 @@ OTHERS_GELS = "others_gels"
 """Diagnostic, a sentence: how many of a material's logs have forces by a gel that another key described."""
 RECONSTRUCTED_FORCES = "reconstructed_forces"
 """Diagnostic, a sentence: how many of a material's logs have forces that no sensor measured."""
+ONE_RECORD = "one_record"
+"""Diagnostic, a sentence: all samples are of one grasp at one place, and why no slope is known of them."""
 NOTES = (
     WEAKENING,
+    ONE_RECORD,
     SAME_GRASPS,
     UNCHECKED,
     OTHERS_CALIBRATIONS,

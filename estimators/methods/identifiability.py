@@ -9,6 +9,11 @@ from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
 
+ONE_RECORD_ADVICE = (
+    "all samples are of one grasp at one place, in which an error that lasts looks like an effect of velocity or of "
+    "normal force: to know beta1 and beta2 record several grasps, or more places at once"
+)
+
 
 def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) -> FloatArray:
     """Half-width of each coefficient's 95 % interval as a change of μ over its span, in parts of the mean |μ|, [3].
@@ -23,6 +28,11 @@ def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) ->
     return np.asarray(half / max(mean, np.finfo(float).tiny))
 
 
-def identifiable(effect: FloatArray, prior_shift: FloatArray) -> NDArray[np.bool_]:
-    """Whether each coefficient counts as known: its effect is small, and it is the data's rather than the prior's."""
-    return np.asarray((effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift))
+def identifiable(effect: FloatArray, prior_shift: FloatArray, *, of_one_record: bool = False) -> NDArray[np.bool_]:
+    """Whether each coefficient counts as known: its effect is small, and it is the data's rather than the prior's.
+
+    ``of_one_record``: all samples are of one grasp at one place, whose errors may last as long as v and f_n vary. No
+    interval from that record rules it out, so that its slopes do not count as known.
+    """
+    known = (effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift)
+    return np.asarray(known & np.array([True, not of_one_record, not of_one_record]))

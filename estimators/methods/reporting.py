@@ -18,9 +18,9 @@ from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
-from estimators.methods.identifiability import effects, identifiable
+from estimators.methods.identifiability import ONE_RECORD_ADVICE, effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
-from stiction_client.support import ELEMENT_AREAS, SENSOR_GAIN
+from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, SENSOR_GAIN
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -118,8 +118,9 @@ def _difference(weight: FloatArray, gains: Gains, first: int, second: int) -> tu
 
 def describe(data: FitData, linear: LinearFit) -> Diagnostics:
     """The data: how many, in how many clusters, and how well they spread over v and f_n."""
-    unknown: Diagnostics = {"unknown_velocity": in_words(data)} if data.unknown_velocity > 0.0 else {}
-    return unknown | {
+    remarks: Diagnostics = {"unknown_velocity": in_words(data)} if data.unknown_velocity > 0.0 else {}
+    remarks |= {ONE_RECORD: ONE_RECORD_ADVICE} if data.of_one_record else {}
+    return remarks | {
         "effective_n": data.effective_n,
         "clusters": float(data.clusters),
         "cluster_kind": data.cluster_kind,
@@ -158,7 +159,7 @@ def report(
         n=data.n,
         degrees_of_freedom=found.degrees_of_freedom,
         domain=data.domain,
-        identifiable=identifiable(effect, prior_shift),
+        identifiable=identifiable(effect, prior_shift, of_one_record=data.of_one_record),
         element_area=data.element_area,
         diagnostics=describe(data, linear) | by_coefficient("effect", effect) | diagnostics,
         cost=Cost(time.perf_counter() - begin, found.monte_carlo_error),
