@@ -199,7 +199,7 @@ class ProjectionDefaults(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitSurfaceDefaults(Options):
-    """The loads that friction can carry (``limit_surface.py``)."""
+    """How far a load is from the limit of friction (``limit_load.py``)."""
 
     descents: Annotated[int, Option(1, 100_000, "steps", "bound")] = 500
     still: Annotated[float, Option(1e-15, 1e-3, "-", "a weight must not overflow")] = 1e-12

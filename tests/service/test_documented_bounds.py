@@ -13,7 +13,7 @@ from service.domain.jobs import await_job
 from service.domain.logs import same_grasp
 from service.domain.materials import curate, ownership
 from service.domain.resources import receive
-from service.domain.uploads import upload
+from service.domain.uploads import accept
 from service.formats import (
     archive,
     assemble,
@@ -182,7 +182,7 @@ STATED = {
         f"the headers have {request_middleware.MOST_HEADER_BYTES // 1024} kB",
     ),
     "jobs.md": (
-        f"logs of more than a million element-frames or {upload.LONG_FRAMES:,} frames",
+        f"logs of more than a million element-frames or {accept.LONG_FRAMES:,} frames",
         f"a material has at most {curate.MOST_ALIASES} aliases and {ownership.MOST_OWNERS} owners",
         f"`auto` looks at the samples as well while there are at most {pipeline.SAMPLED_AT_INGEST} logs",
         f"the runner looks at the worker process's {WORDS[round(1.0 / process_executor.WATCH_SECONDS)]} times a second",

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.limit_surface import Planar, _answer, _moment, _weights
 
 ALL = np.ones(3, bool)

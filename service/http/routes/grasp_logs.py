@@ -19,15 +19,8 @@ from service.domain.models.stored_results import (
     decode_samples,
 )
 from service.domain.resources.context import Context
-from service.domain.uploads.upload import (
-    ReceivedLog,
-    StoredUpload,
-    UploadRequest,
-    accept,
-    receive_digest,
-    received,
-    store,
-)
+from service.domain.uploads.accept import ReceivedLog, StoredUpload, accept
+from service.domain.uploads.upload import UploadRequest, receive_digest, received, store
 from service.formats import writing
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks

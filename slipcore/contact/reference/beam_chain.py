@@ -16,7 +16,7 @@ from scipy import optimize
 from slipcore.compilation import compiled
 from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.errors import InvalidInput

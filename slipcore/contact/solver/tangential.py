@@ -21,7 +21,7 @@ from slipcore.contact.defaults import TANGENTIAL, TINY
 from slipcore.contact.elasticity.fields import VECTOR, doubled, halved, lengths, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.sliding import sliding_traction
 from slipcore.contact.solver.tangent_space import TangentSpace

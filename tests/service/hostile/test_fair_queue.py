@@ -25,7 +25,7 @@ from db.records import Claim
 from db.repositories import jobs
 from db.tables import JobRow
 from service.domain.jobs.await_job import MOST_SECONDS
-from service.domain.uploads import upload
+from service.domain.uploads import accept
 from service.jobs import executors, worker
 from service.settings import Settings
 from slipcore import GraspLog
@@ -164,7 +164,7 @@ def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
     monkeypatch.setattr(executors, "ProcessExecutor", ThreadExecutor)
     monkeypatch.setattr(worker, "_stores", lambda _: (database, BlobStore(tmp_path)))
     monkeypatch.setattr(ThreadExecutor, "attack_ended", threading.Event())
-    monkeypatch.setattr(upload, "LONG_FRAMES", 1000)
+    monkeypatch.setattr(accept, "LONG_FRAMES", 1000)
     honest, long = numbered(content), numbered(small_and_many(ramp, 2000))
     own, attackers = make("upload"), make("upload")
     worker.warm_up()  # the kernels may have to be compiled

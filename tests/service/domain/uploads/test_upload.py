@@ -23,7 +23,7 @@ from db.records import Claim
 from db.repositories import jobs, materials, runners
 from service.domain.access.principal import ANONYMOUS
 from service.domain.errors import ResultsNotReady
-from service.domain.uploads import upload as domain
+from service.domain.uploads import sent_again
 from service.formats import parquet
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import tangential_ramp
@@ -438,7 +438,7 @@ def test_a_log_is_another_sensors_unless_its_job_goes_by_the_one_before(
     database: Database, monkeypatch: pytest.MonkeyPatch, status: str
 ) -> None:
     changed: list[tuple[str, str]] = []
-    monkeypatch.setattr(domain.grasp_logs, "change_sensor", lambda _, log, sensor: changed.append((log, sensor)))
+    monkeypatch.setattr(sent_again.grasp_logs, "change_sensor", lambda _, log, sensor: changed.append((log, sensor)))
     with database.write() as session:
         material = materials.create(session, "paper", "").id
         job = jobs.add(session, "fit", "ols", material_id=material)
@@ -447,5 +447,5 @@ def test_a_log_is_another_sensors_unless_its_job_goes_by_the_one_before(
             jobs.finish(session, cast(Claim, claim), "done")
     log: Any = SimpleNamespace(id="log", uploaded_by=None, job=SimpleNamespace(id=job))
     with database.write() as session, pytest.raises(ResultsNotReady) if status == "running" else nullcontext():
-        domain._change_sensor(session, log, material, "left", ANONYMOUS)
+        sent_again._change_sensor(session, log, material, "left", ANONYMOUS)
     assert changed == ([] if status == "running" else [("log", "left")])

@@ -13,7 +13,7 @@ from db.repositories import detections
 from db.repositories import sensors as stored_sensors
 from service import formats
 from service.domain.errors import InvalidGraspLog, InvalidValue, TooLarge, UnsupportedFormat
-from service.domain.uploads import upload
+from service.domain.uploads import accept, sent_again, upload
 from slipcore.errors import InvalidInput
 
 GEL = Gel(2e5, 0.48, None, 0.0)
@@ -80,7 +80,7 @@ OTHER = replace(GEL, young_modulus=3e5)
     ],
 )
 def test_a_job_is_done_again_where_it_may_end_otherwise(given: Any, may_differ: bool) -> None:
-    assert upload._may_differ(SESSION, given) is may_differ
+    assert sent_again._may_differ(SESSION, given) is may_differ
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_job_is_done_again_where_it_may_end_otherwise(given: Any, may_differ: 
     ],
 )
 def test_what_was_found_is_gone_on_with_where_it_would_be_the_same(given: Any, can: bool) -> None:
-    assert upload._can_go_on(SESSION, given) is can
+    assert sent_again._can_go_on(SESSION, given) is can
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_a_log_is_long_by_its_frames_its_elements_and_its_detector(
     detector: str, frames: int, grid: tuple[int, int], is_long: bool
 ) -> None:
     new = NewGraspLog("0" * 64, 9, "npz", detector, None, "left", frames, 1.0, grid)
-    assert upload._is_long(new) is is_long
+    assert accept._is_long(new) is is_long
 
 
 @pytest.mark.parametrize("name", ["a", "x" * 200, "Prüfstand 1"])
@@ -162,14 +162,14 @@ def test_a_log_is_corrected_anew_for_who_may_change_it(
 ) -> None:
     def check(*_: object) -> None:
         if not may:
-            raise upload.NotOwner([])
+            raise sent_again.NotOwner([])
 
     monkeypatch.setattr(stored_sensors, "get", lambda *_: SimpleNamespace(gel=GEL, calibration=newer))
-    monkeypatch.setattr(upload, "_check_may_change_log", check)
+    monkeypatch.setattr(sent_again, "_check_may_change_log", check)
     given = log(ended=ended)
     given.calibration = None
     principal: Any = None
-    assert upload._is_calibrated_anew(SESSION, given, None, principal) is is_anew
+    assert sent_again._is_calibrated_anew(SESSION, given, None, principal) is is_anew
 
 
 @pytest.mark.parametrize(("name", "made"), [("npz", 0), ("csv", 0), ("csv", 1)])

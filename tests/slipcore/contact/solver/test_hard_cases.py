@@ -10,7 +10,7 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import MirroredBody
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import InfeasibleLoad
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import sliding_moment

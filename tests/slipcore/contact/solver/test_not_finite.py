@@ -6,7 +6,7 @@ import pytest
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import NotConverged
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.tangential import SolverControl, solve_tangential

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from slipcore.contact.elasticity.fields import resultants, rigid_displacement
-from slipcore.contact.limit_surface import limit_load
+from slipcore.contact.limit_load import limit_load
 from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.sliding import sliding_traction
 

@@ -1,4 +1,4 @@
-"""The loads that friction can carry, to rounding."""
+"""How far a load is from the limit surface (``slipcore.limit_surface``), to rounding: as the solver needs it."""
 
 import numpy as np
 
