@@ -59,10 +59,12 @@ def contradiction(elements: FrictionSamples, contact: ContactFriction, patches: 
     least, most = (1.0 - COLLECTION.agreement) * contact.low, (1.0 + COLLECTION.agreement) * contact.high
     if least <= min(weakly, strongly) and max(weakly, strongly) <= most:
         return None
-    told = f"{'at least ' if contact.is_bound else ''}{contact.low if contact.is_bound else contact.coefficient:.2f}"
+    as_whole = (
+        f"{'at least ' if contact.is_bound else ''}{contact.low if contact.is_bound else contact.coefficient:.2f}"
+    )
     return (
         f"elements show friction of {weakly:.2f} where they press least and {strongly:.2f} where they press most, "
-        f"the contact as a whole {told}"
+        f"the contact as a whole {as_whole}"
     )
 
 

@@ -189,10 +189,10 @@ class GraspLog:
     def force_deviation(self) -> float:
         """Typical standard deviation (N) of reconstructed element forces, by the metadata; 0 where they tell none."""
         try:
-            told = float(self.metadata.get("force_deviation", "0")) if self.has_reconstructed_force else 0.0
+            typical = float(self.metadata.get("force_deviation", "0")) if self.has_reconstructed_force else 0.0
         except ValueError:  # a file's own words
             return 0.0
-        return told if 0.0 <= told <= LIMITS.force else 0.0
+        return typical if 0.0 <= typical <= LIMITS.force else 0.0
 
     def __len__(self) -> int:
         return len(self.time)
@@ -311,9 +311,9 @@ def check_gripper_report(force: float | None, deviation: float | None, largest: 
     """What a gripper reports of one frame, N, with the checks that a whole log gets whose ``largest`` force so far was
     this.
     """
-    told = None if force is None else np.append(_array("gripper_force", force, ()), largest)
-    _check_gripper_force(told)
-    _gripper_force_deviation(deviation, told)
+    report = None if force is None else np.append(_array("gripper_force", force, ()), largest)
+    _check_gripper_force(report)
+    _gripper_force_deviation(deviation, report)
 
 
 def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:

@@ -76,8 +76,8 @@ class SensorModel:
         options = self._noise_options() if method == "filter" and log.has_displacement else {}
         if log.force is not None:
             options |= self._kernel_options()
-        told = tuple(_TOLD[name].format(1e6 * value) for name, value in options.items())
-        return Corrected(corrected, changed + told, options)
+        noted = tuple(_TOLD[name].format(1e6 * value) for name, value in options.items())
+        return Corrected(corrected, changed + noted, options)
 
     def _noise_options(self) -> dict[str, float]:
         """How noisy markers are, where a detector's own estimate from three frames would be too low."""
@@ -129,18 +129,18 @@ class SensorModel:
     def to_json(self) -> dict[str, Any]:
         """As numbers, texts, lists and objects of JSON; what is not known is None."""
         known = [asdict(each) for each in self.estimates]
-        told = [{name: None if _is_nan(value) else value for name, value in each.items()} for each in known]
+        plain = [{name: None if _is_nan(value) else value for name, value in each.items()} for each in known]
         offset = None if self.offset is None else self.offset.tolist()
         about = {name: getattr(self, name) for name in ("sensor", "element_area", "frame_interval", "presses")}
-        return about | {"grid": list(self.grid), "estimates": told, "offset": offset}
+        return about | {"grid": list(self.grid), "estimates": plain, "offset": offset}
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> "SensorModel":
+    def from_json(cls, members: Mapping[str, Any]) -> "SensorModel":
         """As ``to_json`` made it; raises ``InvalidInput`` for anything else."""
         try:
-            about = {name: told[name] for name in ("sensor", "element_area", "frame_interval", "presses")}
-            (rows, columns), offset = told["grid"], told["offset"]
-            estimates = tuple(_estimate(each) for each in told["estimates"])
+            about = {name: members[name] for name in ("sensor", "element_area", "frame_interval", "presses")}
+            (rows, columns), offset = members["grid"], members["offset"]
+            estimates = tuple(_estimate(each) for each in members["estimates"])
             known = None if offset is None else np.array(offset, float)
             return cls(**about, grid=(rows, columns), estimates=estimates, offset=known)
         except (KeyError, TypeError, ValueError) as error:
@@ -149,9 +149,9 @@ class SensorModel:
             ) from error
 
 
-def _estimate(told: Mapping[str, Any]) -> Estimate:
-    value, low, high = (math.nan if told[name] is None else float(told[name]) for name in ("value", "low", "high"))
-    return Estimate(told["name"], told["unit"], value, low, high, told["not_identified"])
+def _estimate(json: Mapping[str, Any]) -> Estimate:
+    value, low, high = (math.nan if json[name] is None else float(json[name]) for name in ("value", "low", "high"))
+    return Estimate(json["name"], json["unit"], value, low, high, json["not_identified"])
 
 
 def _is_nan(value: object) -> bool:

@@ -18,8 +18,8 @@ class InvalidPress(InvalidInput):
 
     def __init__(self, evidence: dict[int, str]) -> None:
         self.evidence = evidence
-        told = "; ".join(f"log {number + 1}: {seen}" for number, seen in evidence.items())
-        super().__init__("logs", told, "a body pressed straight down and lifted, without load sideways")
+        listed = "; ".join(f"log {number + 1}: {seen}" for number, seen in evidence.items())
+        super().__init__("logs", listed, "a body pressed straight down and lifted, without load sideways")
 
     def __str__(self) -> str:
         return f"no pure press is {self.value}; allowed: {self.allowed}"

@@ -88,10 +88,10 @@ def gripper_force(seen: Subject) -> Iterator[Finding]:
         return
     ratio, fifth = seen.total[held] / reported[held], max(len(held) // 5, 2)
     unsure = 3.0 * (seen.log.gripper_force_deviation or 0.0) / float(np.median(reported[held]))
-    told, begin, end = (float(np.median(each)) for each in (ratio, ratio[:fifth], ratio[-fifth:]))
-    beside = seen.limits.gripper_cropped <= told < 1.0 and _leaves_the_lattice(seen, held)
-    if max(told, 1.0 / told) - 1.0 > max(seen.limits.gripper_share, unsure) and not beside:
-        evidence = f"the normal forces of all elements add up to {told:.2g} of what the gripper reports"
+    typical, begin, end = (float(np.median(each)) for each in (ratio, ratio[:fifth], ratio[-fifth:]))
+    beside = seen.limits.gripper_cropped <= typical < 1.0 and _leaves_the_lattice(seen, held)
+    if max(typical, 1.0 / typical) - 1.0 > max(seen.limits.gripper_share, unsure) and not beside:
+        evidence = f"the normal forces of all elements add up to {typical:.2g} of what the gripper reports"
         remedy = "make sure of N on all axes (kgf: 0.1; mN: 1000), and that it is this finger's force"
         yield Finding("gripper's force differs", evidence, remedy)
     elif max(end / begin, begin / end) - 1.0 > max(seen.limits.gripper_trend, unsure):
@@ -253,10 +253,10 @@ def force_frame(seen: Subject) -> Iterator[Finding]:
         )
         remedy = "give forces in the sensor's frame, z along its outward normal; calibrate crosstalk by a pure press"
         yield Finding("leaning forces", evidence, remedy)
-    told = max(seen.limits.no_load, 2.0 * left)
-    if abs(mirrored) > told and left > 2.0 * left_mirrored + seen.limits.no_load:
+    significant = max(seen.limits.no_load, 2.0 * left)
+    if abs(mirrored) > significant and left > 2.0 * left_mirrored + seen.limits.no_load:
         yield _turned("forces go with the markers as in a mirror: two axes are exchanged, or one is reversed")
-    elif abs(follows) > told and abs(turned) > seen.limits.turn:
+    elif abs(follows) > significant and abs(turned) > seen.limits.turn:
         yield _turned(f"forces point {abs(turned):.0f}° away from where the markers go")
 
 

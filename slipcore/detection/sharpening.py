@@ -10,12 +10,12 @@ from slipcore.surface.smoothing import kernel_width, unsmoothed
 
 def kernels_of(log: GraspLog) -> dict[str, float]:
     """Options of method "filter", m: how widely a sensor smooths displacement and forces, as far as noise shows it."""
-    pitch, told = math.sqrt(log.element_area), {}
+    pitch, widths = math.sqrt(log.element_area), {}
     if log.has_displacement:
-        told["marker_kernel"] = pitch * kernel_width(log.time, log.displacement, SMOOTHING.least_noise)
+        widths["marker_kernel"] = pitch * kernel_width(log.time, log.displacement, SMOOTHING.least_noise)
     if log.force is not None:
-        told["force_kernel"] = pitch * kernel_width(log.time, log.force, SMOOTHING.least_force_noise)
-    return {name: width for name, width in told.items() if width > 0.0}
+        widths["force_kernel"] = pitch * kernel_width(log.time, log.force, SMOOTHING.least_force_noise)
+    return {name: width for name, width in widths.items() if width > 0.0}
 
 
 def sharpened(

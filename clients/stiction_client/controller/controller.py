@@ -105,9 +105,9 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
         taken = agrees or (_has_model(state) and _covers_ring(samples, observation, state.settings))
         learned = learned.with_frame(sampled, samples.normal_force.size, taken, state.settings)
     if recognition is not None:
-        told = sampled if agrees and counts else math.nan
+        ratio = sampled if agrees and counts else math.nan
         count = 0 if samples is None else samples.normal_force.size
-        recognition = recognition.step(observation.time, _loaded(load, state.settings), told, count, state.settings)
+        recognition = recognition.step(observation.time, _loaded(load, state.settings), ratio, count, state.settings)
     against = _contradicts(state, sticking, observation.normal, load.size)
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
@@ -276,7 +276,7 @@ def _blind(state: ControllerState) -> bool:
     return (
         state.known is None
         and _loaded(state.load, state.settings)
-        and state.time - state.sticking.told > state.settings.dropout_time
+        and state.time - state.sticking.time > state.settings.dropout_time
     )
 
 

@@ -10,12 +10,12 @@ from stiction_client.controller.settings import ControlSettings
 
 @dataclass(frozen=True, slots=True)
 class StickRatioEstimate:
-    """The stick ratio as it was last ``told`` (s), and the ``friction`` that it speaks for; NaN before there was any.
+    """The ``stick_ratio`` last observed, at ``time`` s, and the ``friction`` that it shows; NaN before any.
 
     ``slipping``: frames in a row in which next to nothing stuck.
     """
 
-    told: float = -math.inf
+    time: float = -math.inf
     stick_ratio: float = math.nan
     friction: float = math.nan
     slipping: int = 0
@@ -27,7 +27,7 @@ class StickRatioEstimate:
         """
         ratio = observation.stick_ratio
         if math.isnan(ratio):
-            return StickRatioEstimate(self.told, math.nan, self.friction, 0)
+            return StickRatioEstimate(self.time, math.nan, self.friction, 0)
         friction = self.friction
         if ratio < settings.told_stick_ratio and size > 0.0 and observation.normal > 0.0:
             friction = size / (observation.normal * utilisation(ratio))

@@ -61,8 +61,8 @@ def simulate(
 
 def _requested(scene: SceneDescription, plan: Plan, found: Refined, more: Mapping[str, str] | None = None) -> GraspLog:
     """The log of a request as the sensor sees it, with what it has come to."""
-    told = {"seconds": f"{found.seconds:.3f}", "estimated accuracy": f"{found.error.largest:.2g}", **(more or {})}
-    return observe(plan, replace(found.log, metadata={"scene": scene.name, **found.log.metadata, **told}))
+    about = {"seconds": f"{found.seconds:.3f}", "estimated accuracy": f"{found.error.largest:.2g}", **(more or {})}
+    return observe(plan, replace(found.log, metadata={"scene": scene.name, **found.log.metadata, **about}))
 
 
 def observe(plan: Plan, log: GraspLog) -> GraspLog:

@@ -16,8 +16,8 @@ def grid_error(changes: Sequence[tuple[float, Difference]]) -> Difference:
     """What a grid leaves, with a margin, by its differences from coarser ones and the factors by which it has more
     cells across; the mean of what each of them says.
     """
-    told = [astuple(_by_one(growth, change)) for growth, change in changes]
-    return Difference(*(float(part) for part in np.mean(told, axis=0)))
+    estimates = [astuple(_by_one(growth, change)) for growth, change in changes]
+    return Difference(*(float(part) for part in np.mean(estimates, axis=0)))
 
 
 def _by_one(growth: float, change: Difference) -> Difference:

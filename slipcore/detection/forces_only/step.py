@@ -28,8 +28,8 @@ RAYLEIGH_MEAN = math.sqrt(math.pi / 2.0)
 
 class ForcesState(NamedTuple):
     """What is remembered: low-passed forces of the elements, ``normal`` [n, m] and ``tangential`` [n, m, 3] N, now and
-    when the load was last looked at; which elements touched then; log-odds of slip [n, m] that changes of the load have
-    told; log weights [g] of friction coefficients; and the probability of slip [n, m].
+    when the load was last looked at; which elements touched then; ``log_odds`` of slip [n, m] by changes
+    of the load; log weights [g] of friction coefficients; and the probability of slip [n, m].
     """
 
     normal: FloatArray
@@ -37,7 +37,7 @@ class ForcesState(NamedTuple):
     last_normal: FloatArray
     last_tangential: FloatArray
     touched: BoolArray
-    told: FloatArray
+    log_odds: FloatArray
     friction: FloatArray
     probability: FloatArray
 
@@ -109,7 +109,7 @@ def follow(before: ForcesState, seen: MeasuredForces, gain: float, kept: ForcesS
                 last = along if anew else before.tangential[i, j, a]
                 kept.tangential[i, j, a] = last + gain * (along - last)
                 kept.last_tangential[i, j, a] = along if anew else before.last_tangential[i, j, a]
-            kept.told[i, j] = 0.0 if anew else before.told[i, j]
+            kept.log_odds[i, j] = 0.0 if anew else before.log_odds[i, j]
             kept.probability[i, j] = 0.0 if anew else before.probability[i, j]
 
 
@@ -174,19 +174,20 @@ def look(
     for k in range(len(grid)):
         weight[k] = math.exp(kept.friction[k] - whole)
         pressed += weight[k] if grid[k] > least else 0.0
-    last = kept.told.copy()
+    last = kept.log_odds.copy()
     kept.last_normal[:], kept.last_tangential[:] = kept.normal, kept.tangential
-    kept.told[:] = 0.0
+    kept.log_odds[:] = 0.0
     kept.probability[:] = 0.0
     for e in range(len(places)):
         i, j = places[e]
         gained = log_sum_of(kept.friction + slip[:, e]) - whole - stick[e]
         gained = log_odds_told(seen.expected[e], seen.falls[e], gained, tuning)
-        told = last[i, j] * math.exp(-moved / tuning.memory) + gained
-        told = min(max(told, -tuning.largest_log_odds), tuning.largest_log_odds) - tuning.pressed_log_odds * pressed
-        kept.told[i, j] = max(told, -tuning.pressed_log_odds)
+        log_odds = last[i, j] * math.exp(-moved / tuning.memory) + gained
+        log_odds = min(max(log_odds, -tuning.largest_log_odds), tuning.largest_log_odds)
+        log_odds -= tuning.pressed_log_odds * pressed
+        kept.log_odds[i, j] = max(log_odds, -tuning.pressed_log_odds)
         for k in range(len(grid)):
-            kept.probability[i, j] += weight[k] / (1.0 + math.exp(-level[k, e] - kept.told[i, j]))
+            kept.probability[i, j] += weight[k] / (1.0 + math.exp(-level[k, e] - kept.log_odds[i, j]))
 
 
 @compiled
@@ -233,16 +234,16 @@ def learn_friction(
     """Change log weights [g] by elements of whose load more is known; what was known fades by the way moved."""
     kept = math.exp(-moved / tuning.friction_memory)
     for k in range(len(friction)):
-        told = 0.0
+        log_likelihood = 0.0
         for e in range(len(stick)):
             if seen.expected[e] > tuning.least_change:
                 at_limit = -log_sum(0.0, -level[k, e])
-                told += log_sum(at_limit + slip[k, e], at_limit - level[k, e] + stick[e])
+                log_likelihood += log_sum(at_limit + slip[k, e], at_limit - level[k, e] + stick[e])
             above = max(seen.ratio[e] / known.friction[k] - 1.0, 0.0)
             if above > 0.0:
                 above /= math.hypot(tuning.excess, seen.deviation[e] / known.friction[k])
-                told -= 0.5 * above * above
-        friction[k] = known.prior[k] + (friction[k] - known.prior[k]) * kept + tuning.friction_weight * told
+                log_likelihood -= 0.5 * above * above
+        friction[k] = known.prior[k] + (friction[k] - known.prior[k]) * kept + tuning.friction_weight * log_likelihood
     friction -= friction.max()
 
 

@@ -70,13 +70,13 @@ class GelCalibration:
 
     def to_json(self) -> dict[str, Any]:
         """Of numbers and texts alone; what is infinite is None."""
-        told = [
+        plain = [
             {name: value if value != math.inf else None for name, value in asdict(each).items()}
             for each in self.estimates
         ]
         return {
             "gel": self.gel.to_json(),
-            "estimates": told,
+            "estimates": plain,
             "correlation": self.correlation.tolist(),
             "force": self.force.tolist(),
             "misfit": self.misfit,

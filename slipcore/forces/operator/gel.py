@@ -48,13 +48,13 @@ class Gel:
         _check("marker_depth", self.marker_depth, self.marker_depth < thinnest, f"less than {thinnest:g} m, the least")
 
     @classmethod
-    def from_json(cls, told: Mapping[str, Any]) -> "Gel":
+    def from_json(cls, properties: Mapping[str, Any]) -> "Gel":
         """As the service gives the gel of a sensor: a ``thickness`` of None is a half-space's. Raises ``InvalidInput``
         for what is no number, another name or a missing modulus or ratio.
         """
         names = [each.name for each in fields(cls)]
         try:
-            return cls(**{name: _read(name, value) for name, value in told.items()})
+            return cls(**{name: _read(name, value) for name, value in properties.items()})
         except (AttributeError, TypeError) as error:
             raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
 
@@ -63,18 +63,18 @@ class Gel:
         return asdict(self) | {"thickness": self.thickness if math.isfinite(self.thickness) else None}
 
 
-def _read(name: str, told: Any) -> Any:
+def _read(name: str, given: Any) -> Any:
     if name != "relative_thickness":
-        return _number(name, told)
-    return None if told is None else tuple(tuple(_number(name, value) for value in row) for row in told)
+        return _number(name, given)
+    return None if given is None else tuple(tuple(_number(name, value) for value in row) for row in given)
 
 
-def _number(name: str, told: object) -> float:
-    if told is None and name == "thickness":
+def _number(name: str, given: object) -> float:
+    if given is None and name == "thickness":
         return math.inf
-    if isinstance(told, bool) or not isinstance(told, int | float):
-        raise InvalidInput(name, repr(told)[:60], "a number")
-    return float(told)
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        raise InvalidInput(name, repr(given)[:60], "a number")
+    return float(given)
 
 
 def _check(name: str, value: float, allowed: bool, what: str) -> None:

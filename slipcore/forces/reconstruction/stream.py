@@ -161,16 +161,16 @@ class ForceStream:
         if moved_by.shape != self._position.shape:
             raise InvalidInput("displacement", f"of shape {list(moved_by.shape)}", f"{list(self._position.shape)}")
         seen = None if observed is None else check_mask("observed", observed, moved_by.shape[:2])
-        told = moved_by if seen is None else np.where(seen[..., None], moved_by, 0.0)
-        if not np.isfinite(time) or not np.isfinite(told).all():
+        observed_displacement = moved_by if seen is None else np.where(seen[..., None], moved_by, 0.0)
+        if not np.isfinite(time) or not np.isfinite(observed_displacement).all():
             raise InvalidInput("frame", "one with numbers that are not", "finite time and displacement")
-        check_displacement(told, self._position)
-        return told, seen
+        check_displacement(observed_displacement, self._position)
+        return observed_displacement, seen
 
     def _reported(self, force: float | None, deviation: float | None) -> KnownForce:
         check_gripper_report(force, deviation, self._largest)
-        told = None if force is None else reported(np.array([force]))
-        known = KnownForce.of(told, deviation, 1, self._largest)
+        report = None if force is None else reported(np.array([force]))
+        known = KnownForce.of(report, deviation, 1, self._largest)
         known.check("gripper_force", self._gel, self._area * self._position[..., 0].size)
         return known[0]
 
@@ -204,12 +204,14 @@ class ForceStream:
         (data,), (seen,) = rows(displacement[None], np.ones((1, *displacement.shape), dtype=bool), self._axes)
         return bool(moved(data, seen, self._noise or 0.0))
 
-    def _marker_frame(self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce) -> MarkerReading:
+    def _marker_frame(
+        self, time: float, displacement: FloatArray, is_observed: BoolArray, known: KnownForce
+    ) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
         A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
         """
-        (data,), (seen,) = rows(displacement[None], told[None], self._axes)
+        (data,), (seen,) = rows(displacement[None], is_observed[None], self._axes)
         there = np.concatenate((seen, known.given))
         self._data = np.where(there, SensorResponse.data(data, known), self._data if self._data.size else 0.0)
         data, before = self._data[: len(seen)], self._touched

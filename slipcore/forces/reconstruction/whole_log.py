@@ -79,11 +79,11 @@ class Reconstruction:
             raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
         deviation = self.force_noise if self.shows_pressure else float(np.abs(self.force).max())
-        told = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
+        about = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
         contact = log.contact
         if contact is None or log.metadata.get("contact") in (BY_MOTION, BY_FORCES):
-            contact, told["contact"] = self._contact_of(log)
-        return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **told})
+            contact, about["contact"] = self._contact_of(log)
+        return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **about})
 
     def for_samples(self, log: GraspLog) -> GraspLog:
         """The log that ``apply`` gave, as friction samples are to be collected from it: with forces averaged alike."""

@@ -144,7 +144,7 @@ def follow(state: ForcesState, seen: ObservedFrame, gain: float) -> ForcesState:
         np.where(anew, normal, state.last_normal),
         np.where(anew[..., None], tangential, state.last_tangential),
         seen.contact,
-        np.where(anew, 0.0, state.told),
+        np.where(anew, 0.0, state.log_odds),
         state.friction,
         np.where(anew, 0.0, state.probability),
     )
@@ -173,14 +173,14 @@ def look(
     known = friction - np.logaddexp.reduce(friction)
     weight, slip = np.exp(known), np.logaddexp.reduce(known[:, None] + slip, axis=0)
     gained = log_odds_told(seen, slip - stick, options)
-    told = state.told[on] * np.exp(-moved / options.memory) + gained
-    told = np.clip(told, -options.largest_log_odds, options.largest_log_odds)
-    told -= options.pressed_log_odds * weight[grid > sticking_friction(before, now, noise, options)].sum()
+    log_odds = state.log_odds[on] * np.exp(-moved / options.memory) + gained
+    log_odds = np.clip(log_odds, -options.largest_log_odds, options.largest_log_odds)
+    log_odds -= options.pressed_log_odds * weight[grid > sticking_friction(before, now, noise, options)].sum()
     after, probability = np.zeros(on.shape), np.zeros(on.shape)
-    after[on] = np.maximum(told, -options.pressed_log_odds)
+    after[on] = np.maximum(log_odds, -options.pressed_log_odds)
     probability[on] = weight @ expit(level + after[on])
     return state._replace(
-        last_normal=state.normal, last_tangential=state.tangential, told=after, friction=friction,
+        last_normal=state.normal, last_tangential=state.tangential, log_odds=after, friction=friction,
         probability=probability,
     )  # fmt: skip
 
@@ -206,12 +206,12 @@ def friction_told(
     """Log weights [g] after elements of whose load more is known; what was known fades by the way moved."""
     at_limit, below = -np.logaddexp(0.0, -level), -np.logaddexp(0.0, level)
     loaded = seen.expected > options.least_change
-    told = np.where(loaded, np.logaddexp(at_limit + slip, below + stick), 0.0)
+    log_likelihood = np.where(loaded, np.logaddexp(at_limit + slip, below + stick), 0.0)
     grid = frictions(options)[:, None]
     above = np.maximum(seen.ratio / grid - 1.0, 0.0) / np.hypot(options.excess, seen.deviation / grid)
     first = prior(options)
     kept = first + (friction - first) * np.exp(-moved / options.friction_memory)
-    weights = kept + options.friction_weight * (told - 0.5 * above**2).sum(axis=1)
+    weights = kept + options.friction_weight * (log_likelihood - 0.5 * above**2).sum(axis=1)
     return np.asarray(weights - weights.max())
 
 
