@@ -36,6 +36,7 @@ NOT_TUNED = {
     "slipcore/contact/elasticity/fields.py": "weights of a linear interpolation",
     "slipcore/contact/elasticity/fourier.py": "sines and cosines of fifths of a turn",
     "slipcore/warm_up.py": "a log to compile kernels with, of which no result is kept",
+    "slipcore/elementary.py": "series of the logarithm and exponential, layout of a double",
     "estimators/likelihoods/kernels.py": "series of the logarithm and exponential, layout of a double",
 }
 """Files whose numbers are mathematics."""

@@ -141,7 +141,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         noise, touching, slipping = method.run(*map(tuple, arguments), velocity)  # numba is slow at named tuples
     else:
         room = workspace(*memory.probability.shape)
-        observe(sensor, last, seen, memory, after, room)
+        observe(sensor, last, seen, memory, after, room, True)
         noise, pressing_noise = (float(known) for known in room.surface.noise[:2])
         observation = ObservedFrame(
             seen.time - last.time,

@@ -110,7 +110,7 @@ def revise(
     sensor: DetectorSetup, log: LogArrays, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
 ) -> None:
     """Decide frame ``k`` again, in the light of what the filter remembers up to frame ``last``."""
-    elements, posterior = rings.elements, room.decision.probability
+    elements, posterior = rings.elements, room.weight  # free until the decision is applied
     kept, least = len(elements), sensor.settings[LEAST_TRANSITION]
     posterior[:] = elements[last % kept, PROBABILITY]
     for i in range(last - 1, k - 1, -1):

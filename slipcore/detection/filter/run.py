@@ -34,7 +34,7 @@ def filter_frame(
     velocity: FloatArray,
 ) -> tuple[float, int, int]:
     """The same in a ``room`` that is there already."""
-    has_force = observe(sensor, last, frame, before, after, room)
+    has_force = observe(sensor, last, frame, before, after, room, False)
     step_filter(sensor, last, frame, before, after, room, has_force)
     touching, slipping = apply_decision(
         sensor.position, last, frame, room.decision, before, after, room.weight, velocity

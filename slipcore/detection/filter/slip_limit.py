@@ -19,6 +19,7 @@ from slipcore.detection.filter.pose import AnchorMotion
 from slipcore.detection.filter.state import EXPECTED, LIMIT_LIKELIHOODS, PROBABILITY, SPRING_X, SPRING_Y, TOUCH_DEPTH
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import Memory
+from slipcore.elementary import exponentials, logarithms
 from slipcore.frames import BoolArray, FloatArray
 
 COUNT = NUMERICS.slip_limits
@@ -121,34 +122,56 @@ def expect_slip(
     over its compression, s² the sum of ``slip_limit_width``² and of the relative variance of the compression. Slip
     itself is earlier, as by a limit of c exp(−``slip_limit_lag``).
     """
-    first, step, count = math.log(tuning.slip_limit_least), step_of_limits(tuning), len(places)
-    width2 = tuning.slip_limit_width * tuning.slip_limit_width
+    count = len(places)
+    begin_limits(rows, count, deviation, tuning)
     alike = 0.0
     for e in range(count):
         i, j = places[e]
-        compression = rows[_COMPRESSION, e]
-        ratio, blur = max(rows[_ELONGATION, e] / compression, _LEAST_RATIO), deviation / compression
-        steep = 1.0 / math.sqrt(width2 + blur * blur)
-        rows[_ODDS, e] = math.exp((first - math.log(ratio)) * steep)
-        rows[_ODDS_RATIO, e], rows[_LAG_FACTOR, e] = math.exp(step * steep), math.exp(-tuning.slip_limit_lag * steep)
         rows[_SHOWN, e], rows[_SLIP, e] = shown_slip(after[PROBABILITY, i, j], tuning), 0.0
         alike += rows[_SHOWN, e]
     alike /= count
     for k in range(COUNT):
         shown_by[k] = weigh_limit(rows, count, weights[k])
     shown_by[COUNT] = weigh_alike(rows[_SHOWN][:count], alike)
-    some_limit, most = 1.0 - weights[COUNT], tuning.slip_limit_odds
-    largest = math.exp(most)
+    some_limit = 1.0 - weights[COUNT]
+    find_log_odds(rows[_SLIP][:count], some_limit, tuning.slip_limit_odds)
     for e in range(count):
         i, j = places[e]
-        slips, sticks, log_odds = rows[_SLIP, e], some_limit - rows[_SLIP, e], 0.0
-        if slips >= largest * sticks:
-            log_odds = most
-        elif sticks >= largest * slips:
-            log_odds = -most
-        else:
-            log_odds = math.log(slips / sticks)
-        after[EXPECTED, i, j] = some_limit * log_odds if some_limit > 0.0 else 0.0
+        after[EXPECTED, i, j] = some_limit * rows[_SLIP, e]
+
+
+@compiled
+def begin_limits(rows: FloatArray, count: int, deviation: float, tuning: Tuning) -> None:
+    """Fill the odds of stick by the first limit, (c/r)^(1/s), their ratio from one limit to the next, and the factor of
+    slip that is earlier than its marker shows.
+    """
+    odds, ratio, lag = rows[_ODDS][:count], rows[_ODDS_RATIO][:count], rows[_LAG_FACTOR][:count]
+    elongation, compression = rows[_ELONGATION][:count], rows[_COMPRESSION][:count]
+    first, step, width2 = math.log(tuning.slip_limit_least), step_of_limits(tuning), tuning.slip_limit_width**2
+    for e in range(count):
+        odds[e] = max(elongation[e] / compression[e], _LEAST_RATIO)
+    logarithms(odds)
+    for e in range(count):
+        blur = deviation / compression[e]
+        steep = 1.0 / math.sqrt(width2 + blur * blur)
+        odds[e] = (first - odds[e]) * steep
+        ratio[e], lag[e] = step * steep, -tuning.slip_limit_lag * steep
+    exponentials(odds)
+    exponentials(ratio)
+    exponentials(lag)
+
+
+@compiled
+def find_log_odds(slips: FloatArray, some_limit: float, most: float) -> None:
+    """Replace probabilities of slip [k], of which the rest to ``some_limit`` is stick, by log-odds of ``most``."""
+    if not some_limit > 0.0:
+        slips[:] = 0.0
+        return
+    largest = math.exp(most)
+    for e in range(len(slips)):
+        sticks = max(some_limit - slips[e], slips[e] / largest)
+        slips[e] = max(slips[e] / sticks, 1.0 / largest)
+    logarithms(slips)
 
 
 @compiled(fastmath={"reassoc"})

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.element import Increment, Measurement, update_element
+from slipcore.detection.filter.element import Increment, Measurements, update_elements
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
-from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
+from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, PoseVariance, object_motion, place_on_object
 from slipcore.detection.filter.slip_limit import step_limits
 from slipcore.detection.filter.state import (
     DOUBTED_FRAMES,
@@ -38,6 +38,7 @@ from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
 from slipcore.detection.shared.records import Decision, DetectorSetup, FrameArrays, Memory, Surface, Workspace
+from slipcore.elementary import exponentials
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -82,71 +83,132 @@ def step_elements(
     tuning: Tuning,
 ) -> None:
     """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
-    surface = room.surface
-    marker_noise, _, between_neighbours, resolution = surface.noise
-    lasting = lasting_noise(marker_noise, between_neighbours, resolution, tuning)
-    after.common[RESOLUTION] = resolution
-    after.common[LASTING] = lasting if lasting > known_or(marker_noise, tuning.unknown_noise) else 0.0
-    variance, force_noise = noise_of_frame(surface, tuning)
-    interval, common, elements = frame.time - last.time, before.common, before.elements
-    last_pose = stored_pose(common, POSE)
-    places = room.places[: find_places(elements, surface.stays, room.places)]
-    anchors, motion, deeper, change, told = rooms_of(room.rows, len(places))
-    shift = shift_of_surroundings(
-        last, frame, before.contact, after.contact, room.weight, room.rows, tuning, after.common
-    )
+    stays, common, elements = room.surface.stays, after.common, before.elements
+    variance, force_noise = noise_of_frame(room.surface, tuning)
+    noise = frame.time - last.time, variance, force_noise
+    lasting = tell_noise(room.surface, tuning, common)
+    places = room.places[: find_places(elements, stays, room.places)]
+    anchors, motion, deeper, change, told, seen = rooms_of(room.rows, len(places))
+    shift = shift_of_surroundings(last, frame, before.contact, after.contact, room.weight, room.rows, tuning, common)
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
-    pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
-    noise = interval, variance, force_noise
-    held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, after.common)
-    reference = stored_pose(common, REFERENCE)
-    reference = object_motion(anchors, reference, pose, spread, tuning.motion_play, motion)
-    if held:
-        motion.x[:] = 0.0
-        motion.y[:] = 0.0
-    else:
-        store_pose(after.common, REFERENCE, reference)
+    pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
+    held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)
+    move_anchors(anchors, pose, spread, held, tuning, motion, common)
     if not (has_force and last.force.size):
         change = change[:, :0]
     force_change(places, last.force, frame.force, change)
     indentation_change(places, last.displacement, frame.displacement, deeper)
-    restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning) and not held
-    readiness = 0.0 if restick or math.isnan(marker_noise) else 1.0  # nor does it begin before noise is known
-    follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
+    restick = restick_under_load(before.common, common, anchors, motion, deeper, change, noise, tuning) and not held
+    gain = low_pass(noise[0], tuning.force_smoothing)
+    follow_forces(elements, room.surface, has_force, gain, after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, after.elements)
-    if held:
-        keep_ratios(elements, places, after.elements, told)
-    elif change.size:
-        weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
-    else:
-        told[:] = 0.0
-    start_elements(position, frame.displacement, shift, surface.stays, pose, variance, after)
-    increment = Increment(interval, variance, restick, held)
-    find_offsets(anchors, pose, places, room.offsets)
+    look_at_forces(elements, places, change.size > 0, held, noise, tuning, told, after)
+    start_elements(position, frame.displacement, shift, stays, pose, variance, after)
+    begins = not (restick or math.isnan(room.surface.noise[0]))  # slip does not before noise is known
+    find_readiness(elements, after.contact, places, begins, tuning, seen.readiness)
     # Neighbours blur where slip begins; only what no force shows is worth that.
-    beside = (
-        0.0 if resolution > 0.0 or has_force else lasting * lasting / (lasting * lasting + tuning.pooling_length**2)
+    pooled = not has_force and common[RESOLUTION] == 0.0 and lasting > 0.0
+    beside = lasting * lasting / (lasting * lasting + tuning.pooling_length**2) if pooled else 0.0
+    look_at_markers(anchors, pose, places, room.offsets, 4.0 * tuning.pooling_outlier * variance, beside, seen)
+    update_elements(
+        elements, after.elements, places, motion, seen, Increment(noise[0], variance, restick, held), tuning
     )
-    scale = 4.0 * tuning.pooling_outlier * variance
-    for e in range(len(places)):
-        i, j = places[e]
-        near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, after.contact, i, j)
-        x, y, left = pooled_offset(room.offsets, i, j, scale, beside)
-        seen = Measurement(
-            motion.x[e],
-            motion.y[e],
-            motion.variance[e],
-            readiness * near,
-            told[0, e],
-            anchors.x[e] + x,
-            anchors.y[e] + y,
-            left,
-        )
-        update_element(elements, after.elements, i, j, seen, increment, tuning)
-    sight = last.displacement, frame.displacement, after.contact, surface.stays
+    sight = last.displacement, frame.displacement, after.contact, stays
     measured = has_force and tuning.force_floor == 0.0  # what is reconstructed from markers says no more than they do
     rooms, noise_now = (room.rows, room.series), (math.sqrt(variance), held, measured)  # anchors are done with
     step_limits(elements, places, motion, sight, noise_now, tuning, rooms, after)
+
+
+@compiled
+def tell_noise(surface: Surface, tuning: Tuning, common: FloatArray) -> float:
+    """Noise of a marker coordinate that lasts, m; put into ``common``, as is the step of its places."""
+    marker_noise, _, between_neighbours, resolution = surface.noise
+    lasting = lasting_noise(marker_noise, between_neighbours, resolution, tuning)
+    common[RESOLUTION] = resolution
+    common[LASTING] = lasting if lasting > known_or(marker_noise, tuning.unknown_noise) else 0.0
+    return float(lasting)
+
+
+@compiled(inline=True)
+def move_anchors(
+    anchors: Anchors,
+    pose: Pose,
+    spread: PoseVariance,
+    held: bool,
+    tuning: Tuning,
+    motion: AnchorMotion,
+    common: FloatArray,
+) -> None:
+    """Fill the ``motion`` of anchors from the pose that ``common`` refers to; none, and no other pose, where held."""
+    reference = object_motion(anchors, stored_pose(common, REFERENCE), pose, spread, tuning.motion_play, motion)
+    if held:
+        motion.x[:] = 0.0
+        motion.y[:] = 0.0
+    else:
+        store_pose(common, REFERENCE, reference)
+
+
+@compiled(inline=True)
+def look_at_forces(
+    elements: FloatArray,
+    places: NDArray[np.int64],
+    compared: bool,
+    held: bool,
+    noise: tuple[float, float, float],
+    tuning: Tuning,
+    told: FloatArray,
+    after: Memory,
+) -> None:
+    """Fill ``told`` [2, k] with the log-odds of slip that forces tell, where they can be ``compared`` with the last.
+
+    ``noise``: interval s, variance of a marker coordinate m², and deviation of an element's force N.
+    """
+    interval, _, force_noise = noise
+    if held:
+        keep_ratios(elements, places, after.elements, told)
+    elif compared:
+        weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
+    else:
+        told[:] = 0.0
+
+
+@compiled
+def find_readiness(
+    elements: FloatArray,
+    contact: BoolArray,
+    places: NDArray[np.int64],
+    begins: bool,
+    tuning: Tuning,
+    readiness: FloatArray,
+) -> None:
+    """Fill how readily slip begins at these places, by how many neighbours slip; 0 unless it ``begins``."""
+    for e in range(len(places)):
+        i, j = places[e]
+        near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, contact, i, j)
+        readiness[e] = near if begins else 0.0
+
+
+@compiled
+def look_at_markers(
+    anchors: Anchors,
+    pose: Pose,
+    places: NDArray[np.int64],
+    offsets: FloatArray,
+    scale: float,
+    beside: float,
+    seen: Measurements,
+) -> None:
+    """Fill where markers are on the object, by their neighbours, too, if these weigh anything ``beside`` them."""
+    if beside == 0.0:
+        for e in range(len(places)):
+            seen.x[e], seen.y[e] = place_on_object(pose, anchors.marker_x[e], anchors.marker_y[e])
+            seen.share[e] = 1.0
+        return
+    find_offsets(anchors, pose, places, offsets)
+    for e in range(len(places)):
+        i, j = places[e]
+        x, y, seen.share[e] = pooled_offset(offsets, i, j, scale, beside)
+        seen.x[e], seen.y[e] = anchors.x[e] + x, anchors.y[e] + y
 
 
 @compiled(inline=True)
@@ -183,13 +245,23 @@ def known_or(noise: float, otherwise: float) -> float:
 
 
 @compiled
-def rooms_of(rows: FloatArray, count: int) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, FloatArray]:
+def rooms_of(
+    rows: FloatArray, count: int
+) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, FloatArray, Measurements]:
     """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
-    change of force [3, k], and the evidence of these [2, k].
+    change of force [3, k], the evidence of these [2, k], and what the step brings.
     """
-    r = rows[:, :count]
-    anchors = Anchors(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7])
-    return anchors, AnchorMotion(r[8], r[9], r[10]), r[11], r[12:15], r[15:17]
+    anchors = Anchors(
+        rows[0][:count], rows[1][:count], rows[2][:count], rows[3][:count],
+        rows[4][:count], rows[5][:count], rows[6][:count], rows[7][:count],
+    )  # fmt: skip
+    motion = AnchorMotion(rows[8][:count], rows[9][:count], rows[10][:count])
+    # stick and weights of anchors, and change of force, are done with once the load has been looked at
+    seen = Measurements(
+        rows[5][:count], rows[6][:count], rows[7][:count], rows[11][:count],
+        rows[15][:count], rows[12][:count], rows[13][:count], rows[14][:count],
+    )  # fmt: skip
+    return anchors, motion, rows[11][:count], rows[12:15, :count], rows[15:17, :count], seen
 
 
 @compiled
@@ -284,15 +356,18 @@ def slip_of_neighbours(elements: FloatArray, contact: BoolArray, i: int, j: int)
 @compiled
 def decide(posterior: FloatArray, expected: FloatArray, threshold: float, decision: Decision) -> None:
     """Slip above the threshold, by the posterior and the log-odds ``expected`` of it; the probability is that of both
-    with its odds shifted to ½ there.
+    with its odds shifted to ½ there. The decision's arrays must be others than these.
     """
     n, m = posterior.shape
     odds = (1.0 - threshold) / threshold
     for i in range(n):
+        factors = decision.probability[i]
+        factors[:] = expected[i]
+        exponentials(factors)
         for j in range(m):
             p = posterior[i, j]
             if expected[i, j] != 0.0:
-                likely = p * math.exp(expected[i, j])
+                likely = p * factors[j]
                 p = likely / (1.0 - p + likely)
             decision.slip[i, j] = p > threshold
             decision.probability[i, j] = p * odds / (1.0 - p + p * odds)

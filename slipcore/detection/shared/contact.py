@@ -65,7 +65,7 @@ def find_contact(
             for j in range(m):
                 contact[i, j] &= bend[i, j] <= hollow
         inside = touch.inside * touch.rim * peak
-        if inside > touch.clear * noise:
+        if inside > touch.clear * noise and not contact.all():
             reach_rim(pressing, bend, max(touch.least, touch.noise * known, touch.reach * peak), inside, contact)
 
 

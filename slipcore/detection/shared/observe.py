@@ -21,16 +21,22 @@ SERIES, _STALE, _MOVED, _LEAST_NOISE = (
 
 @compiled(inline=True)
 def observe(
-    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
+    sensor: DetectorSetup,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: Memory,
+    after: Memory,
+    room: Workspace,
+    needs_normals: bool,
 ) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
     noise estimate. Whether there are forces to believe: an object cannot pull, nor do forces stand still while markers
-    move. Otherwise contact is by shape.
+    move. Otherwise contact is by shape. Without forces normals are only worked out if the method ``needs_normals``.
     """
     normal, pressing, tangential, stays, noise = room.surface
     if frame.normal.size:
         normal[:] = frame.normal
-    else:
+    elif needs_normals or frame.force.size:
         surface_normals(sensor.rest_steps, sensor.orientation, frame.displacement, normal)
     if frame.force.size:
         split_forces(frame.force, normal, pressing, tangential)

@@ -18,7 +18,7 @@ def run_strain_rate(
     sensor, last, frame, before, after = named(sensor, last, frame, before, after)
     n, m = after.probability.shape
     room = workspace(n, m)
-    observe(sensor, last, frame, before, after, room)
+    observe(sensor, last, frame, before, after, room, True)
     surface, interval = room.surface, frame.time - last.time
     step_strain_rate(sensor, frame.displacement, surface, interval, before.elements, after.elements, room.decision)
     touching, slipping = apply_decision(

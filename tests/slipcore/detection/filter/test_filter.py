@@ -8,9 +8,9 @@ from scipy.special import log_ndtr
 from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter import state
-from slipcore.detection.filter.element import Increment, Measurement, update_element
+from slipcore.detection.filter.element import Increment, Measurements, update_elements
 from slipcore.detection.filter.force_ratio import log_normal_cdf, ratio_log_odds
-from slipcore.detection.filter.pose import Anchors, find_pose, place_of_object, place_on_object, pose_at
+from slipcore.detection.filter.pose import AnchorMotion, Anchors, find_pose, place_of_object, place_on_object, pose_at
 from slipcore.detection.filter.tuning import Tuning, settings_of
 
 Scene = Callable[..., GraspLog]
@@ -92,8 +92,11 @@ def updated(p: float, motion: float, share: float, restick: bool) -> float:
     old, new = np.zeros((state.ROWS, 1, 1)), np.zeros((state.ROWS, 1, 1))
     old[state.PROBABILITY] = p
     old[state.STICK_VARIANCE] = old[state.SLIP_VARIANCE] = 1e-12
-    seen = Measurement(motion, 0.0, 0.0, 0.04 if restick else 2.0, 0.0, -share * motion, 0.0, 1.0)
-    update_element(old, new, 0, 0, seen, Increment(1.0 / 30.0, 1e-12, restick, False), TUNING)
+    moved = AnchorMotion(np.array([motion]), np.zeros(1), np.zeros(1))
+    x, readiness, room = np.array([-share * motion]), np.array([0.04 if restick else 2.0]), np.zeros((5, 1))
+    seen = Measurements(x, room[0], np.ones(1), readiness, *room[1:])
+    place, increment = np.zeros((1, 2), np.int64), Increment(1.0 / 30.0, 1e-12, restick, False)
+    update_elements(old, new, place, moved, seen, increment, TUNING)
     return float(new[state.PROBABILITY, 0, 0])
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from slipcore.defaults import FilterOptions
+from slipcore.detection.filter.element import Measurements
 from slipcore.detection.filter.pose import Anchors, pose_at
 from slipcore.detection.filter.state import (
     COMMON,
@@ -25,10 +26,12 @@ from slipcore.detection.filter.step import (
     decide,
     find_anchors,
     find_places,
+    find_readiness,
     force_change,
     indentation_change,
     known_or,
     lasting_noise,
+    look_at_markers,
     noise_of_frame,
     rooms_of,
     slip_of_neighbours,
@@ -94,10 +97,11 @@ def test_places_are_those_that_stay_and_have_a_state_row_by_row() -> None:
 
 def test_rows_are_shared_out_to_as_many_anchors() -> None:
     rows = np.arange(17.0)[:, None] + 0.1 * np.arange(4)
-    anchors, motion, deeper, change, told = unwrap(rooms_of)(rows, 3)
+    anchors, motion, deeper, change, told, seen = unwrap(rooms_of)(rows, 3)
     assert [each[1] for each in anchors] == pytest.approx([0.1, 1.1, 2.1, 3.1, 4.1, 5.1, 6.1, 7.1])
     assert [each[0] for each in motion] == [8.0, 9.0, 10.0]
     assert (deeper[2], change.shape, change[0, 0], told.shape, told[0, 0]) == (11.2, (3, 3), 12.0, (2, 3), 15.0)
+    assert [each[0] for each in seen] == [5.0, 6.0, 7.0, 11.0, 15.0, 12.0, 13.0, 14.0]
 
 
 def test_an_anchor_is_where_an_element_would_be_if_it_stuck_and_where_its_marker_is() -> None:
@@ -163,3 +167,25 @@ def test_log_odds_that_are_expected_add_to_those_of_the_posterior() -> None:
     odds = np.array([[0.0, 4.0 * 3.0 / 9.0, 4.0 * 0.5 * 3.0 / 7.0]])
     np.testing.assert_allclose(decision.probability[:, :3], odds / (1.0 + odds))
     assert decision.probability[0, 3] == 1.0
+
+
+def test_slip_begins_as_readily_as_neighbours_slip_or_not_at_all() -> None:
+    elements, contact, found = np.zeros((ROWS, 3, 3)), np.ones((3, 3), bool), np.zeros(2)
+    elements[PROBABILITY, 0, 1] = 0.8
+    tuning, places = TUNING._replace(onset_inside=0.1, onset_at_front=2.0), np.array([[1, 1], [2, 1]])
+    unwrap(find_readiness)(elements, contact, places, True, tuning, found)
+    np.testing.assert_allclose(found, [0.1 + 2.0 * 0.2, 0.1 + 2.0 * 0.25])
+    unwrap(find_readiness)(elements, contact, places, False, tuning, found)
+    assert not found.any()
+
+
+def test_markers_are_where_they_are_or_drawn_to_their_neighbours() -> None:
+    """Of an object that lies 3 to the right; a neighbour that weighs half as much lies 0.3 further."""
+    anchors, places = Anchors(*np.zeros((8, 2))), np.array([[0, 0], [0, 1]])
+    anchors.marker_x[:], pose = (3.0, 3.3), pose_at(3.0, 0.0, 0.0, 1.0)
+    seen, offsets = Measurements(*np.full((8, 2), 9.0)), np.zeros((2, 1, 2))
+    unwrap(look_at_markers)(anchors, pose, places, offsets, 1.0, 0.0, seen)
+    np.testing.assert_allclose((seen.x, seen.y, seen.share), ([0.0, 0.3], [0.0, 0.0], [1.0, 1.0]), atol=1e-15)
+    unwrap(look_at_markers)(anchors, pose, places, offsets, 1e9, 0.5, seen)
+    np.testing.assert_allclose(seen.x, [0.1, 0.2])
+    np.testing.assert_allclose(seen.share, (1.0 + 0.25) / 1.5**2)
