@@ -120,7 +120,13 @@ def test_the_noise_that_samples_carry_is_taken_out_of_every_fit(samples: Make) -
 
 
 def test_what_one_place_says_by_itself_is_kept_and_left_out_beside_another_grasp(samples: Make) -> None:
-    record = replace(samples(400, noise=np.cumsum(np.random.default_rng(0).standard_normal(400)), scale=0.002))
+    along = np.linspace(0.0, 1.0, 400)  # what errors that last look like must last, too
+    record = samples(
+        noise=np.cumsum(np.random.default_rng(0).standard_normal(400)),
+        scale=0.002,
+        tangential_velocity=5e-3 * along,
+        normal_force=0.06 + 0.04 * np.sin(7.0 * along),
+    )
     record = replace(record, element=np.zeros(400, dtype=np.int64), time=np.arange(400) / 60.0)
     moments = Moments.from_samples(record)
     grasp = moments.grasps[0]
