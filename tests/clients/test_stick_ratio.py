@@ -20,7 +20,7 @@ def step(known: StickRatioEstimate, ratio: float, size: float = 1.0, normal: flo
 def test_friction_is_the_load_over_what_the_sticking_part_leaves() -> None:
     found = step(NOTHING, 0.25)
     assert found.friction == pytest.approx(1.0 / (4.0 * (1.0 - 0.25**1.5)))
-    assert (found.told, found.stick_ratio, found.slipping) == (3.0, 0.25, 0)
+    assert (found.time, found.stick_ratio, found.slipping) == (3.0, 0.25, 0)
     assert found.required(2.0, 0.25) == pytest.approx(8.0)
     assert found.required(1.0, 0.0) == pytest.approx(1.0 / found.friction)
     assert (utilisation(0.0), utilisation(1.0)) == (1.0, 0.0)
@@ -42,7 +42,7 @@ def test_a_contact_that_sticks_as_a_whole_shows_none_either() -> None:
 def test_without_a_ratio_the_time_of_the_last_one_stands_and_no_slip_is_counted() -> None:
     known = step(NOTHING, 0.0)
     lost = known.step(Observation(9.0, 4.0, 1.0), 1.0, SETTINGS)
-    assert (lost.told, lost.friction, lost.slipping) == (3.0, known.friction, 0)
+    assert (lost.time, lost.friction, lost.slipping) == (3.0, known.friction, 0)
     assert math.isnan(lost.stick_ratio)
 
 
