@@ -16,18 +16,18 @@ BETWEEN_LOOKS = 0.1
 """s, as in uvicorn."""
 
 
-class _Told:
+class _ShouldExit:
     """Whether a server shall end; its loop wakes when that is set."""
 
     def __get__(self, server: uvicorn.Server, _kind: type) -> bool:
         return bool(vars(server).get("should_exit"))
 
-    def __set__(self, server: uvicorn.Server, told: bool) -> None:
-        vars(server)["should_exit"] = told
+    def __set__(self, server: uvicorn.Server, value: bool) -> None:
+        vars(server)["should_exit"] = value
         vars(server).get("wake", lambda: None)()
 
 
-async def _until_told(server: uvicorn.Server) -> None:
+async def _main_loop(server: uvicorn.Server) -> None:
     """In place of ``uvicorn.Server.main_loop``."""
     woken, loop = asyncio.Event(), asyncio.get_running_loop()
     vars(server)["wake"] = lambda: loop.call_soon_threadsafe(woken.set)
@@ -43,5 +43,5 @@ def patch(patched: pytest.MonkeyPatch) -> None:
     """Let all servers of this process be such ones."""
     hurried = SimpleNamespace(**vars(asyncio) | {"sleep": lambda seconds: asyncio.sleep(seconds / 20.0)})
     patched.setattr("uvicorn.server.asyncio", hurried)  # where it waits for connections to end
-    patched.setattr(uvicorn.Server, "main_loop", _until_told)
-    patched.setattr(uvicorn.Server, "should_exit", _Told(), raising=False)
+    patched.setattr(uvicorn.Server, "main_loop", _main_loop)
+    patched.setattr(uvicorn.Server, "should_exit", _ShouldExit(), raising=False)

@@ -1,7 +1,8 @@
 """Compiled sums over samples: in blocks that a core's cache holds, several samples an instruction.
 
 Logarithm and exponential are polynomials without a branch, right to 1e-12: what a log likelihood needs. Calls into the
-C library, which takes one number at a time, would cost five times as much.
+C library, which takes one number at a time, would cost five times as much. Those of ``slipcore.elementary`` are right
+to the last digits, by more terms: with them a sum of mixtures takes 1.2 times as long.
 """
 
 import math
