@@ -22,7 +22,7 @@ import estimators
 import slipcore
 from benchmarks.pages import options, picture_folder, save, table, write
 from estimators import Moments
-from service.jobs.pipeline import MOST_REPEATS
+from service.jobs.fit_material import MOST_REPEATS
 from slipcore.contact import RampSchedule, tangential_ramp
 
 Array = NDArray[np.float64]

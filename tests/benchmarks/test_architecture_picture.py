@@ -35,7 +35,7 @@ def test_no_rooms_import_one_another_in_a_circle() -> None:
 
 def test_names_that_a_package_passes_on_count_where_they_are_made() -> None:
     graph = architecture.imports()
-    assert "slipcore.samples" in graph["service.jobs.pipeline"]
+    assert "slipcore.samples" in graph["service.jobs.fit_material"]
     assert "slipcore" not in graph
 
 

@@ -31,7 +31,7 @@ from service.http import sessions as cookies
 from service.http.middleware import authentication, request_middleware
 from service.http.protocol import connections, joined_writes, websockets
 from service.http.schemas import common
-from service.jobs import pipeline, process_executor, webhook
+from service.jobs import fit_material, process_executor, webhook
 from service.observability import access_log
 from service.processes import fair_queue, fair_threads
 from service.slip_benchmark import kinds
@@ -177,14 +177,14 @@ STATED = {
         f"at most `limit` entries (1 to {common.MOST}, usually {common.USUAL})",
         f"With `wait` (at most {await_job.MOST_SECONDS:g} s)",
         f"one has at most {curate.MOST_ALIASES} aliases",
-        f"With more than {pipeline.SAMPLED_AT_INGEST} logs this fit by `auto`",
+        f"With more than {fit_material.SAMPLED_AT_INGEST} logs this fit by `auto`",
         f"A JSON body has at most {bodies.MAX_JSON_BYTES // 1024} kB",
         f"the headers have {request_middleware.MOST_HEADER_BYTES // 1024} kB",
     ),
     "jobs.md": (
         f"logs of more than a million element-frames or {accept.LONG_FRAMES:,} frames",
         f"a material has at most {curate.MOST_ALIASES} aliases and {ownership.MOST_OWNERS} owners",
-        f"`auto` looks at the samples as well while there are at most {pipeline.SAMPLED_AT_INGEST} logs",
+        f"`auto` looks at the samples as well while there are at most {fit_material.SAMPLED_AT_INGEST} logs",
         f"the runner looks at the worker process's {WORDS[round(1.0 / process_executor.WATCH_SECONDS)]} times a second",
     ),
     "problems.md": (

@@ -19,7 +19,7 @@ from db.database import Database
 from db.records import Claim, Gel, NewGraspLog
 from db.repositories import grasp_logs, jobs, runners, sensors
 from db.tables import GraspLogRow
-from service.jobs import pipeline, process_executor, worker
+from service.jobs import find_samples, pipeline, process_executor, worker
 from service.jobs.executor import LimitReached, WorkerDied
 from service.processes import limits
 from service.settings import Settings
@@ -87,7 +87,7 @@ def test_a_lattice_whose_reconstruction_has_no_room_is_refused_before_any_of_it_
     database: Database, claim: Claim, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A log of so many elements went on to 1.9 GB, also after its cancel."""
-    monkeypatch.setattr(pipeline, "with_forces", lambda *_: pytest.fail("it has begun"))
+    monkeypatch.setattr(find_samples, "with_forces", lambda *_: pytest.fail("it has begun"))
     place = 1e-3 * np.stack(np.meshgrid(np.arange(113.0), np.arange(113.0), [0.0], indexing="ij"), axis=-1)[:, :, 0]
     wide = container.encode(GraspLog(np.arange(3.0), place, np.zeros((3, *place.shape)), 1e-6))
     with database.write() as session:

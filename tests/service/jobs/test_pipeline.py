@@ -34,7 +34,7 @@ from service.domain.models.stored_results import (
 from service.domain.models.surface_change import MARK
 from service.domain.planning.look_up import FrictionQuery, look_up
 from service.domain.sensors.names import NAMELESS
-from service.jobs import pipeline
+from service.jobs import find_samples, fit_material, pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
 from stiction_client.container import encode
@@ -149,7 +149,7 @@ def test_logs_and_streams_that_name_no_sensor_are_of_one(
     shop: Shop, content: bytes, most_sampled: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They had been fitted as of two, whose gains are unknown: with intervals twice as wide."""
-    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
+    monkeypatch.setattr(fit_material, "SAMPLED_AT_INGEST", most_sampled)
     for k, name in enumerate(NAMELESS):
         shop.run(shop.ingest(another_grasp(content, k), name)[1])
     scales = [each.model.scales for each in shop.material().models if each.model.method == "hierarchical"]
@@ -160,7 +160,7 @@ def test_logs_and_streams_that_name_no_sensor_are_of_one(
 def test_what_sensors_differ_by_is_stored_and_told(
     shop: Shop, content: bytes, most_sampled: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
+    monkeypatch.setattr(fit_material, "SAMPLED_AT_INGEST", most_sampled)
     shop.run(shop.ingest(content)[1])
     shop.run(shop.ingest(another_grasp(content), "other")[1])
     stored = next(each for each in shop.material().models if each.model.method == "hierarchical")
@@ -250,13 +250,13 @@ def test_a_whole_log_without_samples_makes_no_grasps_one(
     """Its material would not be fitted again."""
     for begin in (0, 1):
         shop.run(shop.ingest(encode(ramp.take(slice(begin, None, 2))))[1])
-    collect = pipeline.collect
+    collect = find_samples.collect
 
     def none(*arguments: Any) -> Any:
         found, _ = collect(*arguments)
         return found._replace(samples=found.samples.take(slice(0))), "no slip"
 
-    monkeypatch.setattr(pipeline, "collect", none)
+    monkeypatch.setattr(find_samples, "collect", none)
     assert shop.run(shop.ingest(encode(ramp))[1]).status == "refused"
     with shop.database.read() as session:
         assert len(detections.samples_of_material(session, shop.material_id)) == 2
@@ -268,14 +268,14 @@ def test_a_cut_log_that_is_looked_at_meanwhile_does_not_count_either(
 ) -> None:
     """Neither of two jobs at once has seen the other's grasp before both store theirs."""
     log_id, job = shop.ingest(encode(ramp.take(slice(-1))))
-    check = pipeline.slipcore.check_log
+    check = slipcore.check_log
 
     def check_late(*arguments: Any) -> Any:
-        monkeypatch.setattr(pipeline.slipcore, "check_log", check)
+        monkeypatch.setattr(slipcore, "check_log", check)
         shop.run(shop.ingest(content)[1])
         return check(*arguments)
 
-    monkeypatch.setattr(pipeline.slipcore, "check_log", check_late)
+    monkeypatch.setattr(slipcore, "check_log", check_late)
     assert shop.run(job).status == "done"
     with shop.database.read() as session:
         parts = detections.samples_of_material(session, shop.material_id)
@@ -300,7 +300,7 @@ def test_logs_are_compared_while_others_may_write(
             shop.run(shop.ingest(content)[1])
         return alike
 
-    monkeypatch.setattr(pipeline, "find_alike", compare_while_another_stores)
+    monkeypatch.setattr(find_samples, "find_alike", compare_while_another_stores)
     assert shop.run(job).status == "done"
     assert found == [False, False, True]  # of ours, of the other, and of ours with that
     told = shop.log(log_id).detection
@@ -323,7 +323,7 @@ def test_answers_say_that_logs_were_not_checked(shop: Shop, content: bytes, miss
 def test_a_log_that_lowers_what_may_be_counted_on_is_named(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", 0)
+    monkeypatch.setattr(fit_material, "SAMPLED_AT_INGEST", 0)
     ids = []
     for number in range(3):
         log_id, job_id = shop.ingest(another_grasp(content, number))
@@ -344,7 +344,7 @@ def test_a_log_that_lowers_what_may_be_counted_on_is_named(
 def test_an_ingest_of_many_logs_looks_at_moments_alone(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", 1)
+    monkeypatch.setattr(fit_material, "SAMPLED_AT_INGEST", 1)
     seen: list[type] = []
     fit = estimators.fit
 
@@ -409,7 +409,7 @@ def test_a_job_that_was_interrupted_goes_on_where_it_was(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(f"service.jobs.pipeline.{dies_in}", die)
+        patch.setattr(f"db.repositories.{dies_in}", die)
         with pytest.raises(KeyboardInterrupt):
             shop.run(job_id)
     assert shop.material().models == ()
@@ -553,11 +553,11 @@ def test_a_fit_that_logs_overtake_is_made_again(shop: Shop, content: bytes, monk
     shop.run(shop.ingest(content)[1])
 
     def add(count: int) -> None:
-        if count <= pipeline.MOST_REPEATS:
+        if count <= fit_material.MOST_REPEATS:
             shop.run(shop.ingest(another_grasp(content, count))[1])
 
     fitted = overtake(monkeypatch, add)
-    assert shop.run(shop.fit()).model_version == 2 + pipeline.MOST_REPEATS
+    assert shop.run(shop.fit()).model_version == 2 + fit_material.MOST_REPEATS
     assert fitted == [1, 2, 3, 4]
 
 
@@ -568,7 +568,7 @@ def test_nobody_waits_for_a_fit_that_logs_overtake_all_the_time(
     shop.run(shop.ingest(content)[1])
     fitted = overtake(monkeypatch, lambda count: shop.run(shop.ingest(another_grasp(content, count))[1]))
     assert shop.run(shop.fit("conjugate")).status == "done"
-    assert fitted == [1 + tries for tries in range(1 + pipeline.MOST_REPEATS)]
+    assert fitted == [1 + tries for tries in range(1 + fit_material.MOST_REPEATS)]
     assert {stored.model.method: stored.outdated for stored in shop.material().models} == {
         "conjugate": True,
         "hierarchical": False,
@@ -632,7 +632,7 @@ def test_a_first_model_of_logs_that_were_withdrawn_under_its_fit_is_fitted_again
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, change: str
 ) -> None:
     """By a method that is not cheap, too: who withdraws a log asks for fits by those of which there is a model."""
-    logs = [shop.ingest(another_grasp(content, number)) for number in range(2 + pipeline.MOST_REPEATS)]
+    logs = [shop.ingest(another_grasp(content, number)) for number in range(2 + fit_material.MOST_REPEATS)]
     for _, ingest in logs:
         shop.run(ingest)
 
@@ -645,7 +645,7 @@ def test_a_first_model_of_logs_that_were_withdrawn_under_its_fit_is_fitted_again
 
     fitted = overtake(monkeypatch, alter)
     assert shop.run(shop.fit("robust")).status == "done"
-    assert len(fitted) == 1 + pipeline.MOST_REPEATS
+    assert len(fitted) == 1 + fit_material.MOST_REPEATS
     with shop.database.read() as session:
         refit = jobs.queued_fit(session, shop.material_id, "robust")
     assert (refit is not None) == (change == "withdrawn")
@@ -657,7 +657,7 @@ def test_no_model_of_logs_that_were_all_withdrawn_under_its_fit_is_stored(
     shop.run(shop.ingest(content)[1])
 
     def alter(count: int) -> None:
-        if count <= pipeline.MOST_REPEATS:
+        if count <= fit_material.MOST_REPEATS:
             shop.run(shop.ingest(another_grasp(content, count))[1])
             return
         with shop.database.write() as session:
@@ -666,7 +666,7 @@ def test_no_model_of_logs_that_were_all_withdrawn_under_its_fit_is_stored(
 
     fitted = overtake(monkeypatch, alter)
     assert shop.run(shop.fit()).status == "refused"
-    assert len(fitted) == 1 + pipeline.MOST_REPEATS
+    assert len(fitted) == 1 + fit_material.MOST_REPEATS
     assert not shop.material().models
 
 
@@ -714,12 +714,12 @@ def test_what_one_method_cannot_fit_another_may(monkeypatch: pytest.MonkeyPatch)
             raise InvalidSamples(method, "such that it fits none", "others")
         return method
 
-    monkeypatch.setattr(pipeline, "_fit_by", fit_by)
+    monkeypatch.setattr(fit_material, "_fit_by", fit_by)
     unfit = {"auto"}
-    assert pipeline._all_that_fit(cast(Any, None), [], ScatterPrior()) == ["ols"]
+    assert fit_material._all_that_fit(cast(Any, None), [], ScatterPrior()) == ["ols"]
     unfit = {"auto", "ols"}
     with pytest.raises(InvalidSamples, match="auto"):
-        pipeline._all_that_fit(cast(Any, None), [], ScatterPrior())
+        fit_material._all_that_fit(cast(Any, None), [], ScatterPrior())
 
 
 def refuse(_shop: Shop, _job_id: str) -> None:

@@ -32,7 +32,7 @@ from service.domain.errors import DomainError, InvalidValue, NoModel, NotOwner
 from service.domain.materials import curate
 from service.domain.planning.look_up import Friction, FrictionQuery, look_up
 from service.domain.resources.context import Context
-from service.jobs import pipeline
+from service.jobs import fit_material, pipeline
 from service.settings import Settings
 from slipcore import Finding
 from tests.service.grasps import another_grasp
@@ -199,7 +199,7 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
     with shop.database.write() as session:
         jobs.add(session, "fit", "robust", material_id=materials.find_id(session, "paper"))
     shop.work()
-    before, detect = shop.model("paper", "robust"), pipeline.slipcore.detect_slip
+    before, detect = shop.model("paper", "robust"), slipcore.detect_slip
     log_id = shop.store("paper", 1)
 
     def withdraw() -> None:
@@ -213,7 +213,7 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
         withdraw()
         assert shop.model("paper", "robust") == before
     else:
-        monkeypatch.setattr(pipeline.slipcore, "detect_slip", withdraw_and_detect)
+        monkeypatch.setattr(slipcore, "detect_slip", withdraw_and_detect)
     shop.work()
     assert shop.model("paper", "robust") == before
     assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["hierarchical", "ols", "robust"]
@@ -228,7 +228,7 @@ def test_a_surface_that_changed_is_marked_on_its_models_and_recorded_once(
 
     seen = [shop.ingest("paper", 0)]
     assert shop.friction("paper").support != "stale"
-    monkeypatch.setattr(pipeline, "with_change", marked)
+    monkeypatch.setattr(fit_material, "with_change", marked)
     for number in (1, 2):
         seen.append("")
         shop.ingest("paper", number)
@@ -314,7 +314,7 @@ def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
 
 def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     shop.ingest("paper", 0)
-    bad, fit = shop.ingest("paper", 1), pipeline._fit
+    bad, fit = shop.ingest("paper", 1), fit_material._fit
     both, withdrawn = shop.model("paper")[1], []
 
     def withdraw_meanwhile(*given: Any) -> Any:
@@ -327,7 +327,7 @@ def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeyp
         jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
     claim = shop.claim()
     assert claim is not None
-    monkeypatch.setattr(pipeline, "_fit", withdraw_meanwhile)
+    monkeypatch.setattr(fit_material, "_fit", withdraw_meanwhile)
     pipeline.run_job(shop.database, shop.blobs, claim)
     assert shop.model("paper") == (3, both // 2, False)
 
@@ -340,7 +340,7 @@ def test_a_fit_under_way_is_of_what_its_material_is_merged_into_though_its_logs_
     with shop.database.write() as session:
         source = materials.find_id(session, "papre")
         job_id = jobs.add(session, "fit", "conjugate", material_id=source)
-    claim, fit, merged = shop.claim(), pipeline._fit, list[object]()
+    claim, fit, merged = shop.claim(), fit_material._fit, list[object]()
     assert claim is not None
 
     def merge_meanwhile(*given: Any) -> Any:
@@ -348,7 +348,7 @@ def test_a_fit_under_way_is_of_what_its_material_is_merged_into_though_its_logs_
             merged.append(curate.merge(shop.context, "paper", "papre"))
         return fit(*given)
 
-    monkeypatch.setattr(pipeline, "_fit", merge_meanwhile)
+    monkeypatch.setattr(fit_material, "_fit", merge_meanwhile)
     pipeline.run_job(shop.database, shop.blobs, claim)
     assert shop.model("paper", "conjugate")[0] == 1
     with shop.database.read() as session:
