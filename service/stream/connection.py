@@ -25,7 +25,7 @@ from service.domain.sensors.reconstruct import described_by_another
 from service.domain.uploads.upload import UploadRequest, check_target
 from service.formats.reading import Description
 from service.json_objects import RepeatedKey
-from service.stream import detectors
+from service.stream.detector_session import PackedFrame
 from service.stream.errors import FINISHED, IN_USE, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
     UNNAMED,
@@ -235,7 +235,7 @@ class _Connection:
             raise End(SLOW_READER, f"{MOST_WAITING_OUT} answers wait to be read") from None
 
     async def _detect(self, session: Session, frame: FrameIn) -> tuple[dict[str, Any], bytes | None]:
-        given = detectors.PackedFrame(
+        given = PackedFrame(
             frame.number,
             frame.time,
             packed("displacement", frame.displacement),

@@ -1,12 +1,9 @@
 """Live detectors, in a worker process: one a session, fed frame by frame. Module-level functions of plain values."""
 
-import logging
 import math
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,39 +11,33 @@ from numpy.typing import NDArray
 import estimators
 import slipcore
 from db.blobs import disk_errors_named
-from estimators.errors import EstimatorError
 from service.domain.sensors.reconstruct import early_touch
 from service.formats.reading import Description, describe
-from service.processes.fair_executor import FairExecutor
-from service.report.wording import LEVELS
+from service.stream.detector_session import (
+    WINDOW,
+    DetectorSession,
+    MemoryLimit,
+    Numbers,
+    PackedFrame,
+    SessionOptions,
+    log_of,
+)
+from service.stream.friction_looks import plan_look
 from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
-from service.stream.messages import Control
 from service.stream.reconstructing import Reconstructing
 from slipcore import (
     Finding,
     Frame,
-    FrictionSamples,
     GraspLog,
     InvalidInput,
     SlipState,
-    collect_samples,
     for_reconstructed_forces,
 )
 from slipcore.checks.recording import begun_in_contact
 from slipcore.defaults import FilterOptions
-from slipcore.frames import UNNAMED, check_displacement, check_gripper_report, check_span
+from slipcore.frames import check_displacement, check_gripper_report, check_span
 from stiction_client import container
-
-if TYPE_CHECKING:
-    import stiction_client
-    from estimators import FrictionModel, Moments
-    from slipcore import DetectorState, SlipDetector
-
-logger = logging.getLogger(__name__)
-
-WINDOW, STRIDE = 45, 30
-"""Frames that friction samples are looked for in, and frames from one look to the next: once a second."""
 
 MAX_KEPT_BYTES = 64 * 2**20
 """Bytes of frames kept of one session for its log: 12 minutes of a 20×20 sensor with forces at 30 frames a second."""
@@ -55,90 +46,7 @@ MAX_MARKERS = 4096
 MOST_COMMAND = 1e6
 """N, as of the planner's forces."""
 
-Numbers = bytes | Sequence[float]
-"""Numbers in a row, row-major: bytes of little-endian float32 or float64, or flat."""
-
-
-class PackedFrame(NamedTuple):
-    """A frame as it comes from the server's process; ``command`` is the normal force commanded to the gripper, N, and
-    ``gripper_force`` the one that it reports, with its standard ``gripper_force_deviation``.
-    """
-
-    number: int
-    time: float
-    displacement: Numbers
-    force: Numbers | None = None
-    object_pose: Numbers | None = None
-    normal: Numbers | None = None
-    command: float | None = None
-    gripper_force: float | None = None
-    gripper_force_deviation: float | None = None
-
-
-class MemoryLimit(NamedTuple):
-    """Of all sessions together ``most_bytes``, of which one ``owner`` has half of what the others leave."""
-
-    owner: str
-    most_bytes: int
-
-
-class SessionOptions(NamedTuple):
-    """What a session has beside its detector, each where it was asked for or is known.
-
-    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one, or else
-    recognises one of ``materials``; ``gel``: of the sensor (``slipcore.forces.Gel.from_json``), by which forces follow
-    where frames have none.
-    """
-
-    control: Control | None = None
-    model: "stiction_client.FrictionModel | None" = None
-    gel: Mapping[str, Any] | None = None
-    materials: "Mapping[str, stiction_client.FrictionModel] | None" = None
-
-
-@dataclass(slots=True)
-class DetectorSession:
-    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
-    gripper ``reported`` in them; and the controller of the grip, where one was asked for.
-
-    ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``findings``: what its first
-    frame shows to cost it friction. ``friction`` is what its client is told, ``expected`` what those are who watch it;
-    ``begun``: time of its first frame, s.
-    """
-
-    detector: "SlipDetector"
-    position: NDArray[np.float64]
-    element_area: float
-    moments: "Moments"
-    limit: MemoryLimit
-    kept: list[Frame] | None
-    reported: list[float | None] = field(default_factory=list)
-    report_deviation: float | None = None
-    most_reported: float = 0.0
-    grip: Grip | None = None
-    forces: Reconstructing | None = None
-    findings: list[Finding] = field(default_factory=list)
-    frames: list[Frame] = field(default_factory=list)
-    answers: list[SlipState] = field(default_factory=list)
-    until_look: int = WINDOW
-    look: Future[None] | None = None
-    looked_until: float = -math.inf
-    last: tuple[int, dict[str, Any]] = (-1, {})
-    friction: dict[str, Any] | None = None
-    expected: dict[str, float] | None = None
-    held_bytes: int = 0
-    begun: float | None = None
-
-    @property
-    def all_bytes(self) -> int:
-        """With what its forces take."""
-        return self.held_bytes + (0 if self.forces is None else self.forces.held_bytes)
-
-
 _SESSIONS: dict[str, DetectorSession] = {}
-
-_LOOKS = FairExecutor()
-"""Does the looks for friction, so that frames need not wait for them."""
 
 
 class FitInProgress(Exception):
@@ -194,7 +102,7 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         session.findings = list(begun_in_contact(state.contact))
     session.begun = frame.time if session.begun is None else session.begun
     _keep(session, frame, given, size)
-    _plan_look(session, with_forces, state)
+    plan_look(session, with_forces, state)
     answer = _answer(session, given.number, state)
     if force_report is not None:
         answer["force"] = force_report
@@ -272,7 +180,7 @@ def write(name: str, target: Path, sensor: str) -> Description:
     frames = session.kept or []
     if len(frames) < 2:
         raise InvalidInput("frames", len(frames), "at least 2, for a log")
-    log = _with_reports(session, _log(session, frames, sensor, {"session": name}))
+    log = _with_reports(session, log_of(session, frames, sensor, {"session": name}))
     with disk_errors_named():
         container.write(log, target)
     return describe("stream", log)
@@ -322,67 +230,6 @@ def _check_room(size: int, limit: MemoryLimit) -> None:
         raise InvalidInput("bytes", own + size, allowed)
 
 
-def _plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None:
-    """Once in a while, let the last frames be looked at."""
-    if frame.force is None:
-        return
-    if session.forces is not None and session.forces.stream is not None:
-        frame = frame._replace(force=session.forces.alike)
-    session.frames = [*session.frames[1 - WINDOW :], frame]
-    session.answers = [*session.answers[1 - WINDOW :], state]
-    session.until_look -= 1
-    if session.until_look == 0:
-        session.until_look = STRIDE
-        noise = None if session.forces is None or session.forces.stream is None else session.forces.noise
-        given = session.frames, session.answers, session.detector.state, noise
-        session.look = _LOOKS.of(session.limit.owner).submit(_look, session, *given)
-
-
-def _look(
-    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
-) -> None:
-    try:
-        _find_friction(session, frames, answers, state, noise)
-    except Exception:  # costs the stream this second's friction, and nothing else
-        logger.exception("a look for friction failed")
-
-
-def _find_friction(
-    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
-) -> None:
-    """The samples since the last look, merged with those before; ``noise`` N of forces that are reconstructed."""
-    options = {} if noise is None else {"force_noise": noise}
-    samples = collect_samples(_log(session, frames, "", {}), slipcore.collect_history(answers, state), **options)
-    end = frames[-1].time  # which has no next frame yet, so it is the next look's
-    new = (samples.time >= session.looked_until) & (samples.time < end)
-    session.looked_until = end
-    part = {name: getattr(samples, name)[new] for name in samples.arrays()}
-    found = FrictionSamples(**part, element_area=samples.element_area)
-    session.moments = session.moments.merge(estimators.Moments.from_samples(found, places=False))
-    try:
-        model = session.moments.fit()
-    except EstimatorError:  # too few samples yet
-        return
-    session.friction, session.expected = _summary(model), _expected(model)
-
-
-def _summary(model: "FrictionModel") -> dict[str, Any]:
-    return {
-        "coefficients": model.coefficients.tolist(),
-        "standard_errors": [value if math.isfinite(value) else None for value in model.standard_errors.tolist()],
-        "scale": float(model.scale),
-        "samples": model.n,
-    }
-
-
-def _expected(model: "FrictionModel") -> dict[str, float] | None:
-    """Friction of an element that begins to slip under the middle of the forces seen, with 90 % of new observations."""
-    force = 0.5 * sum(model.domain.normal_force)
-    low, high = (float(model.predict(0.0, force, quantile=level)) for level in LEVELS)
-    found = {"mean": float(model.predict(0.0, force)), "low": low, "high": high, "normal_force": force}
-    return found if all(map(math.isfinite, found.values())) else None
-
-
 def _answer(session: DetectorSession, number: int, state: SlipState) -> dict[str, Any]:
     return {
         "type": "state",
@@ -400,24 +247,6 @@ def _answer(session: DetectorSession, number: int, state: SlipState) -> dict[str
 def _findings(session: DetectorSession) -> list[Finding]:
     stream = None if session.forces is None else session.forces.stream
     return [early_touch()] if stream is not None and stream.touched_early else session.findings
-
-
-def _log(session: DetectorSession, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:
-    def stacked(name: str) -> NDArray[np.float64] | None:
-        parts = [getattr(frame, name) for frame in frames]
-        return None if any(part is None for part in parts) else np.stack(parts)
-
-    return GraspLog(
-        time=np.array([frame.time for frame in frames]),
-        position=session.position,
-        displacement=np.stack([frame.displacement for frame in frames]),
-        element_area=session.element_area,
-        force=stacked("force"),
-        object_pose=stacked("object_pose"),
-        normal=stacked("normal"),
-        sensor=sensor or UNNAMED,
-        metadata=metadata,
-    )
 
 
 def _array(name: str, numbers: Numbers, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from service.processes.fair_queue import UnboundedFairQueue
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
+from service.stream.detector_session import MemoryLimit, PackedFrame, SessionOptions
 from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.live_frame import pack_end
 from service.stream.messages import Open, packed
@@ -131,8 +132,8 @@ class Streams:
         try:
             await self.ask(
                 session, detectors.open_session, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes),
-                detectors.SessionOptions(opening.control, model, gel, materials),
+                opening.keep, MemoryLimit(session.owner, self._most_bytes),
+                SessionOptions(opening.control, model, gel, materials),
             )  # fmt: skip
         except BaseException:
             self._forget(session)
@@ -224,9 +225,7 @@ class Streams:
         async with self._turns.turn(session.owner):
             return await self.call(do, session.id, *arguments)
 
-    async def detect(
-        self, session: Session, frame: detectors.PackedFrame, is_shown: bool
-    ) -> tuple[dict[str, Any], bytes | None]:
+    async def detect(self, session: Session, frame: PackedFrame, is_shown: bool) -> tuple[dict[str, Any], bytes | None]:
         """The answer to a frame and what watchers see of it; raises ``InvalidInput``, and ``End`` as ``call`` does.
 
         A frame that comes faster than the last ones are looked at waits, and no other session with it.

@@ -38,6 +38,7 @@ from service.slip_benchmark import kinds
 from service.stream import (
     broadcast,
     connection,
+    detector_session,
     detectors,
     grip,
     messages,
@@ -86,7 +87,7 @@ STATED = {
         f"from its parsing to its answer, all together {WORDS[context.LONG_BODIES]}.",
         f"go to their detectors {WORDS[sessions.FRAMES_AT_ONCE]} at once, "
         f"of each client {WORDS[sessions.FRAMES_OF_ONE]}:",
-        f"for friction once in {detectors.STRIDE} frames",
+        f"for friction once in {detector_session.STRIDE} frames",
         f"with more than {await_job.LOOKERS} at once more seldom, down to every {await_job.MOST_LOOK_SECONDS:g} s.",
         f"logs of more than {reading.SHORT_BYTES // 2**20} MiB)",
         f"windows of {2**receive.WINDOW_LOG // 2**20} MiB at most",
@@ -111,8 +112,8 @@ STATED = {
         f"the detector works waits ({connection.MOST_WAITING_IN} frames), one that does not read its answers is "
         f"dropped ({connection.MOST_WAITING_OUT} answers).",
         f"Kept frames of one session may have {detectors.MAX_KEPT_BYTES // 2**20} MiB",
-        f"no room for the {detectors.WINDOW} frames that are looked at",
-        f"looked for once in {detectors.STRIDE} frames with forces",
+        f"no room for the {detector_session.WINDOW} frames that are looked at",
+        f"looked for once in {detector_session.STRIDE} frames with forces",
         f"faster than {1e3 * observing.LEAST_SPEED:g} mm/s",
         f"or lists of numbers, at most {messages.DEEPEST} deep",
         f"(at most {detectors.MAX_MARKERS} markers)",

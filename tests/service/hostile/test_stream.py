@@ -28,8 +28,8 @@ from service.domain.access.principal import Principal
 from service.domain.models.model_cache import ModelCache
 from service.processes.fair_threads import FairThreads
 from service.settings import Settings
-from service.stream import connection, detectors, errors, sessions
-from service.stream.detectors import PackedFrame
+from service.stream import connection, detector_session, detectors, errors, sessions
+from service.stream.detector_session import PackedFrame
 from service.stream.errors import REFUSED, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.messages import MOST_MATERIALS, Open
 from service.stream.sessions import Session, Streams
@@ -136,7 +136,7 @@ def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
 
 
 def test_sessions_of_one_hold_half_of_the_bytes_that_others_leave(make: Callable[..., Streams]) -> None:
-    reserve = detectors.WINDOW * 3 * POSITION.nbytes
+    reserve = detector_session.WINDOW * 3 * POSITION.nbytes
     most = 2 * (2 * reserve + 3 * ZERO.nbytes)
 
     async def go() -> None:

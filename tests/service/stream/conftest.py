@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from service.stream import detectors, reconstructing
+from service.stream import detectors, friction_looks, reconstructing
 
 
 class AtOnce(Executor):
@@ -28,7 +28,7 @@ class AtOnce(Executor):
 def looks_at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[Executor]:
     """So that answers are the same each time; the session of the name ``one`` is dropped at the end."""
     at_once = AtOnce()
-    for module in (reconstructing, detectors):
+    for module in (reconstructing, friction_looks):
         monkeypatch.setattr(module, "_LOOKS", at_once)
     yield at_once
     detectors.drop("one")

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from service import formats
 from service.processes.fair_executor import FairExecutor
-from service.stream import detectors
-from service.stream.detectors import PackedFrame
+from service.stream import detector_session, detectors, friction_looks
+from service.stream.detector_session import STRIDE, WINDOW, PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
 from slipcore.frames import UNNAMED
 from tests.service.report.test_material import MODEL
 
-ROOM = detectors.MemoryLimit("me", 2**30)
+ROOM = detector_session.MemoryLimit("me", 2**30)
 
 
 def unpacked(content: bytes) -> tuple[dict[str, Any], NDArray[np.uint8]]:
@@ -66,9 +66,7 @@ def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
 
 def test_looks_once_a_second_find_the_samples_of_the_whole_log(ramp: GraspLog) -> None:
     samples = collect_samples(ramp, detect_slip(ramp))
-    looked_until = ramp.time[
-        detectors.WINDOW - 1 + (len(ramp) - detectors.WINDOW) // detectors.STRIDE * detectors.STRIDE
-    ]
+    looked_until = ramp.time[WINDOW - 1 + (len(ramp) - WINDOW) // STRIDE * STRIDE]
     expected = np.count_nonzero(samples.time < looked_until)
     friction = feed(ramp, wait=True)
     assert friction is not None
@@ -86,7 +84,7 @@ def test_a_look_that_fails_costs_the_stream_nothing_but_its_friction(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(detectors, "collect_samples", fail)
+    monkeypatch.setattr(friction_looks, "collect_samples", fail)
     assert feed(ramp, wait=True) is None
     assert "a look for friction failed" in caplog.text
 
@@ -131,11 +129,11 @@ def test_a_command_that_is_no_force_is_refused_before_the_frame_is_taken(ramp: G
 
 def test_who_goes_takes_the_looks_along_that_have_not_begun(ramp: GraspLog, monkeypatch: pytest.MonkeyPatch) -> None:
     executor, may_go = FairExecutor(), Event()
-    monkeypatch.setattr(detectors, "_LOOKS", executor)
+    monkeypatch.setattr(friction_looks, "_LOOKS", executor)
     executor.of("another").submit(may_go.wait, 30.0)
     detectors.open_session("one", ramp.position.tobytes(), ramp.grid, ramp.element_area, "filter", False, ROOM)
     session = detectors._SESSIONS["one"]
-    due = detectors.WINDOW + detectors.STRIDE - 1
+    due = WINDOW + STRIDE - 1
     for k in range(due):
         detectors.step("one", whole_frame(ramp, k))
     with pytest.raises(detectors.FitInProgress):
@@ -160,20 +158,20 @@ def test_a_frame_is_taken_in_each_length_that_a_refusal_allows() -> None:
 GRID, AREA = (2, 3), 1e-6
 PLACES = np.stack([*np.meshgrid(1e-3 * np.arange(2.0), 1e-3 * np.arange(3.0), indexing="ij"), np.zeros(GRID)], axis=-1)
 AT_REST = PLACES.ravel().tolist()
-HELD = detectors.WINDOW * 3 * PLACES.nbytes
+HELD = WINDOW * 3 * PLACES.nbytes
 """Bytes of the frames that are looked at."""
 
 
 @pytest.fixture
-def sessions(monkeypatch: pytest.MonkeyPatch) -> dict[str, detectors.DetectorSession]:
+def sessions(monkeypatch: pytest.MonkeyPatch) -> dict[str, detector_session.DetectorSession]:
     """All that there are, none at first."""
-    none = dict[str, detectors.DetectorSession]()
+    none = dict[str, detector_session.DetectorSession]()
     monkeypatch.setattr(detectors, "_SESSIONS", none)
     return none
 
 
 def begin(name: str = "one", most: int = 2**30, owner: str = "me", keep: bool = False, grid: Any = GRID) -> None:
-    detectors.open_session(name, AT_REST, grid, AREA, "filter", keep, detectors.MemoryLimit(owner, most))
+    detectors.open_session(name, AT_REST, grid, AREA, "filter", keep, detector_session.MemoryLimit(owner, most))
 
 
 def plain_frame(number: int, **more: Any) -> PackedFrame:
@@ -186,7 +184,7 @@ def test_a_sensor_has_one_marker_at_least_and_not_any_number(grid: tuple[int, in
         begin(grid=grid)
 
 
-def test_a_client_has_half_of_what_others_leave(sessions: dict[str, detectors.DetectorSession]) -> None:
+def test_a_client_has_half_of_what_others_leave(sessions: dict[str, detector_session.DetectorSession]) -> None:
     begin("mine", most=2 * HELD)
     with pytest.raises(InvalidInput) as refusal:
         begin("another of mine", most=4 * HELD - 2)
@@ -200,7 +198,7 @@ def test_a_client_has_half_of_what_others_leave(sessions: dict[str, detectors.De
 
 
 def test_kept_frames_take_room_by_what_they_hold(
-    sessions: dict[str, detectors.DetectorSession], monkeypatch: pytest.MonkeyPatch
+    sessions: dict[str, detector_session.DetectorSession], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin("plain", keep=True)
     begin(keep=True)
@@ -263,7 +261,7 @@ def test_a_log_whose_gripper_said_nothing_says_nothing_of_it(tmp_path: Path) -> 
     assert (log.gripper_force, log.gripper_force_deviation, log.sensor) == (None, None, UNNAMED)
 
 
-def test_whoever_is_not_there_is_dropped_without_a_word(sessions: dict[str, detectors.DetectorSession]) -> None:
+def test_whoever_is_not_there_is_dropped_without_a_word(sessions: dict[str, detector_session.DetectorSession]) -> None:
     detectors.drop("nobody")
     begin()
     detectors.drop("one")
@@ -271,17 +269,17 @@ def test_whoever_is_not_there_is_dropped_without_a_word(sessions: dict[str, dete
 
 
 def test_expected_friction_is_that_under_the_middle_of_the_forces_seen() -> None:
-    found = detectors._expected(cast("Any", MODEL))
+    found = friction_looks._expected(cast("Any", MODEL))
     low, high = (float(MODEL.predict(0.0, 0.07, quantile=level)) for level in (0.05, 0.95))
     expected = {"mean": float(MODEL.predict(0.0, 0.07)), "low": low, "high": high, "normal_force": 0.07}
     assert found == pytest.approx(expected)
     unsure = replace(MODEL, covariance=np.full((3, 3), np.inf))
-    assert detectors._expected(cast("Any", unsure)) is None
-    told = detectors._summary(cast("Any", MODEL))
+    assert friction_looks._expected(cast("Any", unsure)) is None
+    told = friction_looks._summary(cast("Any", MODEL))
     assert told["coefficients"] == [0.45, 0.1, -0.02]
     assert told["standard_errors"] == pytest.approx([0.02, 1.0, 2.0])
     assert (told["scale"], told["samples"]) == (0.02, 200)
-    assert detectors._summary(cast("Any", unsure))["standard_errors"] == [None] * 3
+    assert friction_looks._summary(cast("Any", unsure))["standard_errors"] == [None] * 3
 
 
 @pytest.mark.parametrize(("first", "told"), [(0, []), (30, ["76 elements touch in the first frame"])])

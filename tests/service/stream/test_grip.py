@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
 
-from service.stream import detectors
-from service.stream.detectors import PackedFrame
+from service.stream import detector_session, detectors
+from service.stream.detector_session import PackedFrame
 from service.stream.grip import settings_of
 from service.stream.messages import Control
 from service.stream.observing import LEAST_SHARE, LEAST_SPEED, WINDOW, Observer
@@ -18,11 +18,11 @@ from stiction_client import GraspController, InvalidArgument
 FORCES = {"least_force": 0.5, "most_force": 30.0}
 ROUND = Control(6e-5, FORCES, round_at=5.0)
 
-ROOM = detectors.MemoryLimit("me", 2**30)
+ROOM = detector_session.MemoryLimit("me", 2**30)
 
 
 def open_session(log: GraspLog, control: Control | None, keep: bool = False) -> None:
-    options = detectors.SessionOptions(control)
+    options = detector_session.SessionOptions(control)
     detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", keep, ROOM, options)
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from service.domain.sensors.reconstruct import CONTRADICTED
 from service.formats import read
-from service.stream import detectors, reconstructing
-from service.stream.detectors import PackedFrame
+from service.stream import detector_session, detectors, friction_looks, reconstructing
+from service.stream.detector_session import PackedFrame
 from service.stream.messages import Control
 from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
 from slipcore.defaults import FilterOptions
@@ -20,14 +20,14 @@ pytestmark = pytest.mark.usefixtures("looks_at_once")
 
 GEL = {"young_modulus": 1e6, "poisson_ratio": 0.5, "thickness": None, "marker_depth": 0.0}
 """What the ramp is pressed on."""
-ROOM = detectors.MemoryLimit("me", 2**30)
+ROOM = detector_session.MemoryLimit("me", 2**30)
 GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
 
 
 def opened(
-    log: GraspLog, keep: bool = False, limit: detectors.MemoryLimit = ROOM, control: Control | None = None
-) -> detectors.DetectorSession:
-    options = detectors.SessionOptions(control, gel=GEL)
+    log: GraspLog, keep: bool = False, limit: detector_session.MemoryLimit = ROOM, control: Control | None = None
+) -> detector_session.DetectorSession:
+    options = detector_session.SessionOptions(control, gel=GEL)
     detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", keep, limit, options)
     return detectors._SESSIONS["one"]
 
@@ -53,7 +53,7 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
         found.append(collect_samples(*arguments))
         return found[-1]
 
-    monkeypatch.setattr(detectors, "collect_samples", collected)
+    monkeypatch.setattr(friction_looks, "collect_samples", collected)
     session = opened(ramp, control=GRIP)
     reports = -ramp.force[..., 2].sum(axis=(1, 2))
     answers = [detectors.step("one", frame(ramp, k, gripper_force=reports[k]))[0] for k in range(len(ramp))]
@@ -128,7 +128,7 @@ def test_frames_have_forces_all_or_none_by_the_first_one_that_is_taken(ramp: Gra
 def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
     ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened(ramp, limit=detectors.MemoryLimit("me", 3 * 2**20))
+    opened(ramp, limit=detector_session.MemoryLimit("me", 3 * 2**20))
     assert "bytes is" in detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
     monkeypatch.setattr(reconstructing, "MOST_NODES", 300)
     opened(ramp)
