@@ -135,6 +135,7 @@ CLIENT = ROOT / "clients/stiction_client"
 
 CLIENT_OTHER = {
     "calls.py": "waiting and retrying, which change no answer",
+    "exchange.py": "waiting and retrying, which change no answer",
     "client.py": "waiting and retrying, which change no answer",
     "stream.py": "waiting and retrying, which change no answer",
     "container.py": "the format's layout",

@@ -14,9 +14,9 @@ import httpx
 
 from stiction_client import calls, head_timeout
 from stiction_client.arguments import within
-from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import AnswerTooLarge, ConnectionFailed, InvalidArgument
+from stiction_client.exchange import Call, Ended, Pause, Reply, Request, T, advance
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
@@ -292,7 +292,7 @@ class FrictionClient:
 
     def _run(self, call: Call[T]) -> T:
         answer: Reply = None
-        while not isinstance(step := calls.advance(call, answer), Ended):
+        while not isinstance(step := advance(call, answer), Ended):
             answer = self._carry_out(step)
         return step.result
 
@@ -512,7 +512,7 @@ class AsyncFrictionClient:
 
     async def _run(self, call: Call[T]) -> T:
         answer: Reply = None
-        while not isinstance(step := calls.advance(call, answer), Ended):
+        while not isinstance(step := advance(call, answer), Ended):
             answer = await self._carry_out(step)
         return step.result
 

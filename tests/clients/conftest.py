@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 import uvicorn
 
-import stiction_client.calls
 from service.app import create_app
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
-from stiction_client import AsyncFrictionClient, Cost, Domain, FrictionClient, FrictionModel
+from stiction_client import AsyncFrictionClient, Cost, Domain, FrictionClient, FrictionModel, calls, exchange
 
 MODEL = {
     "material": "paper",
@@ -150,8 +149,9 @@ def ask(request: pytest.FixtureRequest) -> Ask:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pauses of a microsecond, so that retries and polls take no time."""
-    for name in ("RETRY_PAUSE", "FIRST_POLL", "LONGEST_POLL"):
-        monkeypatch.setattr(stiction_client.calls, name, 1e-6)
+    monkeypatch.setattr(exchange, "RETRY_PAUSE", 1e-6)
+    for name in ("FIRST_POLL", "LONGEST_POLL"):
+        monkeypatch.setattr(calls, name, 1e-6)
 
 
 @pytest.fixture

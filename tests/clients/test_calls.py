@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from stiction_client import ConnectionFailed, InvalidArgument, ProblemError, UnexpectedAnswer, calls, problems
-from stiction_client.calls import CachedModel, Ended, Pause, Request, advance
+from stiction_client.calls import CachedModel
+from stiction_client.exchange import Ended, Pause, Request, advance
 from stiction_client.records import Material
 
 JOB = {

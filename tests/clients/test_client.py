@@ -34,6 +34,7 @@ from stiction_client import (
     UnexpectedAnswer,
     calls,
     container,
+    exchange,
 )
 
 Ask = Callable[..., Any]
@@ -256,11 +257,11 @@ def test_polls_get_rarer_up_to_a_bound(answers: SimpleNamespace, monkeypatch: py
     monkeypatch.setattr("stiction_client.calls.time", SimpleNamespace(monotonic=lambda: 0.0))
     call = stiction_client.calls.wait("j1", 1e6)
     running = httpx.Response(200, json=answers.job | {"status": "running"})
-    steps = [stiction_client.calls.advance(call, None)]
+    steps = [exchange.advance(call, None)]
     for _ in range(30):
-        steps.append(stiction_client.calls.advance(call, running))
-        steps.append(stiction_client.calls.advance(call, None))
-    pauses = [step.seconds for step in steps if isinstance(step, stiction_client.calls.Pause)]
+        steps.append(exchange.advance(call, running))
+        steps.append(exchange.advance(call, None))
+    pauses = [step.seconds for step in steps if isinstance(step, exchange.Pause)]
     expected = [min(0.05 * 1.5**k, 2.0) for k in range(30)]
     assert pauses == pytest.approx(expected, rel=1e-12)  # rounding: answers take no time on this clock
 
@@ -419,11 +420,11 @@ def test_a_busy_service_is_asked_again(
 @pytest.mark.usefixtures("quick")
 def test_a_busy_service_is_left_alone_as_long_as_it_asks(asked: str, waited: float) -> None:
     call = calls.material("paper")
-    assert isinstance(calls.advance(call, None), calls.Request)
+    assert isinstance(exchange.advance(call, None), exchange.Request)
     busy = problem(503)
     busy.headers["Retry-After"] = asked
-    assert calls.advance(call, busy) == calls.Pause(waited)
-    assert isinstance(calls.advance(call, None), calls.Request)
+    assert exchange.advance(call, busy) == exchange.Pause(waited)
+    assert isinstance(exchange.advance(call, None), exchange.Request)
 
 
 def test_a_service_that_is_busy_for_long_is_not_waited_for(ask: Ask, service: Service) -> None:
@@ -512,7 +513,7 @@ def test_behind_a_proxy_that_says_the_service_is_away_the_last_model_is_used(
         first = client.model("paper")
         with pytest.warns(StaleModel, match="going on with the model of 'paper'"):
             assert client.model("paper") is first
-        assert len(asked) == 1 + calls.ATTEMPTS
+        assert len(asked) == 1 + exchange.ATTEMPTS
         with pytest.raises(ProblemError if "json" in answer else UnexpectedAnswer):
             client.model("another")
 

@@ -50,7 +50,7 @@ from service.stream import (
 )
 from service.stream import errors as ends
 from service.web import comparison, frames, grasp_effects, posterior, samples
-from stiction_client import calls, client
+from stiction_client import client, exchange
 from stiction_client.exports import coulomb, mujoco
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -214,8 +214,8 @@ STATED = {
     ),
     "client.md": (
         f"requests wait at most {client.TIMEOUT:g} s (`timeout=`)",
-        f"is tried {WORDS[calls.ATTEMPTS]} times",
-        f"not if that is later than in {calls.LONGEST_RETRY:g} s",
+        f"is tried {WORDS[exchange.ATTEMPTS]} times",
+        f"not if that is later than in {exchange.LONGEST_RETRY:g} s",
         f"a conservative quantile of μ ({coulomb.QUANTILE:g} by default",
         f"a fingertip's {1e6 * coulomb.FINGERTIP:g} mm² unless given",
         f'impratio="{mujoco.IMPRATIO}" noslip_iterations="{mujoco.NOSLIP_ITERATIONS}"',
