@@ -25,8 +25,11 @@ from service.http.protocol.httptools_connections import HttpToolsConnection
 
 TIMEOUT = 0.2
 MOST, MOST_OF_ONE = 60, 100
-LARGE = bytes(2**25)
-"""More than the system keeps of what a client does not read."""
+BUFFER = 2**16
+"""Bytes that the system may keep of what a client does not read, on either side: Linux doubles it."""
+
+LARGE = bytes(2**21)
+"""More than that."""
 
 Connect = Callable[..., socket.socket]
 
@@ -66,7 +69,6 @@ def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection], 
     server = uvicorn.Server(
         uvicorn.Config(
             hello,
-            port=0,
             lifespan="off",
             log_level="critical",
             http=partial(protocol, per_address=most_of_one),  # type: ignore[arg-type]
@@ -76,15 +78,18 @@ def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection], 
             ws="none",
         )
     )
-    thread = threading.Thread(target=server.run)
+    listening = socket.create_server(("127.0.0.1", 0))
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)  # also of connections that it accepts
+    thread = threading.Thread(target=server.run, args=([listening],))
     thread.start()
     while not server.started:
         time.sleep(0.005)
     opened: list[socket.socket] = []
 
     def open_one(source: str = "127.0.0.1") -> socket.socket:
-        address = server.servers[0].sockets[0].getsockname()
+        address = listening.getsockname()
         opened.append(socket.create_connection(address, timeout=10.0, source_address=(source, 0)))
+        opened[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         return opened[-1]
 
     yield open_one
