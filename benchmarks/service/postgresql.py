@@ -13,7 +13,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Engine, NullPool, create_engine, make_url, text
+from sqlalchemy import URL, Engine, create_engine, make_url, text
 from sqlalchemy.exc import OperationalError
 
 from db import migrate
@@ -55,6 +55,7 @@ class PostgreSQL:
 
     def stop(self, how: signal.Signals) -> None:
         """End it as ``pg_ctl stop`` does: SIGINT ends its connections (fast), SIGQUIT its processes (immediate)."""
+        self.engine.dispose()
         self._process.send_signal(how)
         self._process.wait()
 
@@ -101,7 +102,8 @@ class PostgreSQL:
         return True
 
     def _engine(self, database: str) -> Engine:
-        return create_engine(self.url(database), poolclass=NullPool, isolation_level="AUTOCOMMIT")
+        options: dict[str, Any] = {"isolation_level": "AUTOCOMMIT", "pool_size": 1, "pool_pre_ping": True}
+        return create_engine(self.url(database), **options)
 
     def _run(self, statement: str) -> None:
         with self.engine.connect() as connection:
