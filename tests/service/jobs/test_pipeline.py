@@ -93,9 +93,10 @@ class Shop:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def detected_once() -> Iterator[None]:
-    """Slip and samples of the log that most jobs here are about; fits are done each time."""
-    with remembering(*((slipcore, name) for name in ("detect_slip", "collect_friction", "check_log"))):
+def worked_out_once() -> Iterator[None]:
+    """What most jobs here are about: slip and samples of one log, forces by one gel, and fits of these samples."""
+    detection = [(slipcore, name) for name in ("detect_slip", "collect_friction", "check_log")]
+    with remembering(*detection, (forces, "reconstruct"), (estimators, "fit")):
         yield
 
 
