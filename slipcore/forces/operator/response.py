@@ -1,6 +1,8 @@
 """Displacement of markers by traction on the surface: the forward operator."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,20 +59,28 @@ def _of_a_layer(
     close = RESPONSE.near * cells
     farthest = int(np.ceil(max(np.abs(offset).max() for offset in offsets)))
     reach = max(farthest + 3, close)  # a cubic spline ends three cells beyond
-    far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
-    middle = (slice(reach - close, reach + close + 1),) * 2
     matrices = [np.empty((len(axes), len(position), 3, len(each))) for each in nodes]
-    for component, table in far.items():
+    for component, spline in _splines(gel, pitch, cells, finer, close, reach).items():
         directions = [(axes.index(to), by) for to, by in _directions(component) if to in axes]
         if not directions:
             continue
-        table[middle] = near[component][::finer, ::finer]
-        spline = spline_filter(table, order=3, mode="mirror")
         for matrix, offset, place in zip(matrices, offsets, places, strict=True):
             value = map_coordinates(spline, (offset + reach).T[::-1], order=3, mode="mirror", prefilter=False)[place]
             for to, by in directions:
                 matrix[to, :, by] = value
     return matrices
+
+
+@lru_cache(maxsize=2)  # logs of one sensor ask for the same, and 1 to 7 MB
+def _splines(gel: Gel, pitch: float, cells: int, finer: int, close: int, reach: int) -> Mapping[Below, FloatArray]:
+    """``hat_responses`` at offsets of up to ``reach`` cells, by ``finer`` ones up to ``close``, as cubic splines."""
+    far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
+    middle = (slice(reach - close, reach + close + 1),) * 2
+    for component, table in far.items():
+        table[middle] = near[component][::finer, ::finer]
+        far[component] = spline_filter(table, order=3, mode="mirror")
+        far[component].flags.writeable = False
+    return MappingProxyType(far)
 
 
 def _offsets(position: FloatArray, places: FloatArray, cell: float) -> tuple[FloatArray, NDArray[np.intp]]:

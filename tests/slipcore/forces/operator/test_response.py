@@ -138,3 +138,23 @@ def test_few_nodes_near_their_markers_move_them_as_they_do_among_others(side: in
     (among,) = response_matrices(gel, pitch, [place], place)
     assert found.shape == (3, side**2, 3, side**2)
     np.testing.assert_allclose(found, among[:, few][..., few], rtol=1e-3, atol=1e-3 * np.abs(among).max())
+
+
+def test_logs_of_one_sensor_tabulate_its_gel_once_and_another_gel_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    tabulated: list[Gel] = []
+    hats = response.hat_responses
+
+    def counted(gel: Gel, *given: Any) -> Any:
+        tabulated.append(gel)
+        return hats(gel, *given)
+
+    monkeypatch.setattr(response, "hat_responses", counted)
+    response._splines.cache_clear()
+    soft, hard = Gel(1e6, 0.49, 5e-3), Gel(2e6, 0.49, 5e-3)
+    first, again = (response_matrix(soft, NODES, MARKERS) for _ in range(2))
+    of_hard = response_matrix(hard, NODES, MARKERS)
+    assert tabulated == [soft, soft, hard, hard], "far and near"
+    np.testing.assert_array_equal(first, again)
+    np.testing.assert_allclose(of_hard, 0.5 * first, rtol=1e-9, atol=1e-20)
+    moved = response_matrix(soft, NODES, MARKERS + 0.3 * PITCH)
+    assert np.abs(moved - first).max() > 0.01 * np.abs(first).max()
