@@ -330,12 +330,15 @@ class ContactOptions(Options):
     pitch squared) lie beyond the contact's rim."""
     rim_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "tuning scenes")] = 2.0
     """Least hollow at the rim over the noise of the curvature."""
-    rim_inside: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.68
-    """Share of the rim's least hollow up to which an element beside the contact still lies inside."""
-    rim_clear: Annotated[float, Option(0.0, 100.0, "standard deviations", "one gap would let the contact leak")] = 4.0
-    """How far that must be above noise for the contact to be followed to its rim."""
-    contact_reach: Annotated[float, Option(0.0, 0.99, "-", "bonded gels of 4.5 to 8 mm among the tuning scenes")] = 0.2
-    """Least share of the deepest indentation of elements between those found in contact and the rim."""
+    contact_reach: Annotated[float, Option(0.0, 0.99, "-", "bonded gels of 4.5 to 8 mm among the tuning scenes")] = 0.15
+    """Least share of the frame's deepest indentation on a bonded gel, without forces, where the rim is looked at."""
+    contact_widening: Annotated[
+        float, Option(0.0, 100.0, "-", "up to 3.1 on the bonded gels of the tuning scenes, 7 on a half-space (Hertz)")
+    ] = 4.0
+    """A gel is taken for bonded where fewer than so many times the elements above ``contact_depth_share`` of the
+    deepest indentation lie above ``contact_reach`` of it."""
+    contact_edge: Annotated[float, Option(0.0, 1.0, "-", "0 on these gels, 1 on half-spaces seen in part")] = 0.25
+    """Least share of the lattice's edge that lies so deep where that cannot be told."""
     contact_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
     """Least multiple of the estimated noise of force or indentation."""
     release_share: Annotated[float, Option(0.0, 1.0, "-", "hysteresis against flicker at the edge")] = 0.7
@@ -900,9 +903,11 @@ MOST_LOOKAHEAD = 100
 
 FORMER_OPTIONS = frozenset(
     {"onset_time", "end_time", "motion_margin", "onset_under_restick", "following_least", "pressing_sideways_variances"}
+    | {"rim_inside", "rim_clear"}
 )
-"""Of method ``filter``: the first three until slip began and ended by motion and load alone, the others until it was
-measured that they change nothing; ignored with a warning for one version."""
+"""Of method ``filter``: the first three until slip began and ended by motion and load alone, the next until it was
+measured that they change nothing, and the last two until a contact on a bonded gel was found by ``contact_reach``
+alone; ignored with a warning for one version."""
 
 Kind = TypeVar("Kind", bound=Options)
 

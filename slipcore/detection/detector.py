@@ -120,11 +120,11 @@ def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[Floa
         rim=options.rim_curvature,
         rim_noise=options.rim_noise,
         reach=options.contact_reach,
-        inside=options.rim_inside,
-        clear=options.rim_clear,
+        widening=options.contact_widening,
+        edge=options.contact_edge,
     )
     least = options.contact_pressure * element_area
-    by_force = by_shape._replace(least=least, share=options.contact_force_share, rim=1.0, reach=1.0)
+    by_force = by_shape._replace(least=least, share=options.contact_force_share, rim=1.0)
     return np.array(by_force), np.array(by_shape)
 
 

@@ -21,7 +21,7 @@ def test_the_names_of_the_methods_are_those_of_the_table() -> None:
     assert tuple(METHODS) == METHOD_NAMES
 
 
-@pytest.mark.parametrize("name", ["onset_time", "following_least"])
+@pytest.mark.parametrize("name", ["onset_time", "following_least", "rim_clear"])
 def test_a_former_option_is_ignored_with_a_warning(name: str) -> None:
     with pytest.warns(DeprecationWarning, match=f"option {name} has no effect"):
         assert choose_options(FilterOptions, {name: 0.5, "creep": 1e-6}) == FilterOptions(creep=1e-6)

@@ -16,8 +16,8 @@ _LEAST = NOISE.least_series
 class ContactThreshold(NamedTuple):
     """What an element needs to touch: ``least`` N or m, ``share`` of the frame's peak, ``noise`` multiples of it; the
     share of that under which it is released; the rim's least hollow, as a share of the peak (1: not looked at), and
-    ``rim_noise`` multiples of that of the curvature; the share of the peak that is enough inside the rim of a contact;
-    the share of the rim's hollow that still counts as inside, and the multiple of noise at which it is looked at.
+    ``rim_noise`` multiples of that of the curvature; and for ``is_bonded`` the share of the peak that is enough on a
+    bonded gel (``reach``), how many times as many elements may reach that, and how many of the lattice's edge.
     """
 
     least: float
@@ -27,8 +27,8 @@ class ContactThreshold(NamedTuple):
     rim: float
     rim_noise: float
     reach: float
-    inside: float
-    clear: float
+    widening: float
+    edge: float
 
 
 TOUCH = len(ContactThreshold._fields)
@@ -43,7 +43,8 @@ def find_contact(
     """Elements pressed (N, or m of indentation, positive inwards) by more than a threshold tied to the frame.
 
     ``sigma``: noise of ``pressing``, NaN where unknown. Elements in contact ``before`` are released only under
-    ``release`` of the threshold. Where the shape is hollow the contact has ended, and up to there it reaches.
+    ``release`` of the threshold. Where the shape is hollow the contact has ended; on a bonded gel, whose rim lies far
+    under half of the depth, a share of the peak tells the contact from what is beside it better.
     """
     n, m = pressing.shape
     peak = 0.0
@@ -53,81 +54,37 @@ def find_contact(
     if math.isnan(sigma):
         sigma = spatial_noise(pressing)
     known = 0.0 if math.isnan(sigma) else sigma
-    threshold = max(touch.least, touch.share * peak, touch.noise * known)
+    looks = touch.rim < 1.0 and min(n, m) >= 3
+    bonded = looks and is_bonded(pressing, peak, touch)
+    threshold = max(touch.least, (touch.reach if bonded else touch.share) * peak, touch.noise * known)
     for i in range(n):
         for j in range(m):
             p = pressing[i, j]
             contact[i, j] = p > threshold or (before[i, j] and p > touch.release * threshold)
-    if touch.rim < 1.0 and min(n, m) >= 3:
-        noise, bend = CURVATURE_NOISE * known, curvature(pressing)
-        hollow = max(touch.rim_noise * noise, touch.rim * peak)
+    if looks and not bonded:
+        hollow, bend = max(touch.rim_noise * CURVATURE_NOISE * known, touch.rim * peak), curvature(pressing)
         for i in range(n):
             for j in range(m):
                 contact[i, j] &= bend[i, j] <= hollow
-        inside = touch.inside * touch.rim * peak
-        if inside > touch.clear * noise and not contact.all():
-            reach_rim(pressing, bend, max(touch.least, touch.noise * known, touch.reach * peak), inside, contact)
 
 
 @compiled
-def reach_rim(pressing: FloatArray, bend: FloatArray, least: float, hollow: float, contact: BoolArray) -> None:
-    """Let the contact reach to where the shape bends by ``hollow``, m, from what was found.
+def is_bonded(pressing: FloatArray, peak: float, touch: ContactThreshold) -> bool:
+    """Whether the surface beside the contact falls as fast as that of a thin gel bonded to its back: fewer elements
+    than ``widening`` times those that lie above ``share`` of the peak lie above ``reach`` of it.
 
-    Elements pressed by ``least`` join that hang together with those found: a bonded gel is so flat at the rim that this
-    lies far under half of the depth. They do, each once, beside three that touch: those along a straight edge, more
-    than show through a single gap. None do where no rim is met: around a contact of many elements on a half-space the
-    shape bends by little from one to the next.
+    On a half-space they are about seven times as many (Hertz), whatever the contact's size, so that they come to the
+    lattice's edge unless it is wide; where more than the share ``edge`` of that lie so deep, it cannot be told.
     """
-    n, m = contact.shape
-    found, may = contact.copy(), (bend <= hollow) & (pressing > least)
-    beside, waiting = np.zeros((n, m), np.int64), np.empty((n * m, 2), np.int64)
-    count = 0
+    n, m = pressing.shape
+    high = low = beside = 0
     for i in range(n):
         for j in range(m):
-            if contact[i, j]:
-                waiting[count, 0], waiting[count, 1] = i, j
-                count += 1
-    while count > 0:
-        count -= 1
-        row, column = waiting[count, 0], waiting[count, 1]
-        for i in range(max(row - 1, 0), min(row + 2, n)):
-            for j in range(max(column - 1, 0), min(column + 2, m)):
-                beside[i, j] += 1
-                if beside[i, j] >= 3 and may[i, j] and not contact[i, j]:
-                    contact[i, j] = True
-                    waiting[count, 0], waiting[count, 1] = i, j
-                    count += 1
-    if not is_rimmed(contact, found, bend, hollow):
-        contact[:] = found
-
-
-@compiled
-def is_rimmed(contact: BoolArray, found: BoolArray, bend: FloatArray, hollow: float) -> bool:
-    """Whether the shape bends by ``hollow`` along half or more of the outline.
-
-    The lattice's edge is no rim where the contact has come to it from what was ``found``.
-    """
-    n, m = contact.shape
-    outline = rim = 0
-    for i in range(n):
-        for j in range(m):
-            if contact[i, j] and not found[i, j]:
-                outline += not (0 < i < n - 1 and 0 < j < m - 1)
-            elif not contact[i, j] and neighbours(contact, i, j):
-                outline += 1
-                rim += bend[i, j] > hollow
-    return 2 * rim >= outline > 0
-
-
-@compiled
-def neighbours(contact: BoolArray, i: int, j: int) -> int:
-    """How many of the eight neighbours touch."""
-    n, m = contact.shape
-    count = 0
-    for a in range(max(i - 1, 0), min(i + 2, n)):
-        for b in range(max(j - 1, 0), min(j + 2, m)):
-            count += contact[a, b]
-    return int(count - contact[i, j])
+            high += pressing[i, j] > touch.share * peak
+            if pressing[i, j] > touch.reach * peak:
+                low += 1
+                beside += i == 0 or j == 0 or i == n - 1 or j == m - 1
+    return low < touch.widening * high and beside < touch.edge * 2 * (n + m - 2)
 
 
 @compiled
