@@ -352,6 +352,10 @@ class ClusterSettings(Options):
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
     independent: Annotated[float, Option(0.01, 0.99, "-", "as likely as not")] = 0.5
     """Probability, before a record of one place is seen, that none of its errors last."""
+    lasting_freedom: Annotated[float, Option(0.5, 100.0, "-", "tuning seeds of 2 to 10 places: 95 % are held")] = 3.0
+    """Degrees of freedom with which the levels of places tell how errors last."""
+    few_places: Annotated[float, Option(0.0, 1.0, "-", "ten places whose errors last: 0.87")] = 0.9
+    """Of what a grasp would say of a slope beside many, below which alone its places are too few."""
     least_neighbours: Annotated[int, Option(2, 1000, "pairs", "a correlation to 0.25")] = 16
     """Of places of a grasp beside each other, from which they show whether neighbours are off alike."""
     most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact shows")] = 0.99

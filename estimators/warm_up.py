@@ -4,7 +4,7 @@ import time
 
 
 def warm_up() -> float:
-    """Compile the likelihoods' sums, or load them from where they are kept; seconds that it took.
+    """Compile the sums over samples and over places, or load them from where they are kept; seconds that it took.
 
     The libraries that only some methods need are loaded on the way.
     """
@@ -14,9 +14,11 @@ def warm_up() -> float:
 
     import estimators.sampling.ensemble  # noqa: F401
     from estimators.likelihoods import kernels
+    from estimators.linear.whitened_levels import whitened
 
     beta, one, column = np.zeros((1, 3)), np.ones(1), np.ones(3)
     kernels.sum_log1p_square(beta, one, column, column, column, column)
     kernels.sum_log_mixture(beta, np.ones((1, 2)), np.ones((1, 3)), column, column, column, column)
     kernels.sum_log_normal(beta, np.ones((1, 2)), np.ones(2), column, column, column, column)
+    whitened(np.ones((1, 3, 3)), np.ones((1, 3)), one, one)
     return time.perf_counter() - began

@@ -42,7 +42,6 @@ ENTRIES = {
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": ("force_floor heading_length", "0 but of reconstructed forces, which the page's logs do not have"),
-    "estimators.CLUSTERS": ("independent", "of records of one place, which the page's grasps are not"),
     "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (

@@ -3,8 +3,8 @@
 Sets of twelve grasps of two seconds that scatter by 3 %, of one place (as of a force sensor) to ten: velocity, normal
 force and an error of 0.01 wander, in each place for itself, and last for a second. Counted are the scatter between
 grasps that is found, and 95 % intervals that hold the law. Of one such grasp alone the same, where they last for so
-many samples: of its moments, the law's friction at rest and at the middle of the data, and slopes. Writes
-lasting_errors.json.
+many samples: of its moments, the law's friction at rest and at the middle of the data, and slopes; and how often these
+count as known. Writes lasting_errors.json.
 """
 
 import os
@@ -42,6 +42,7 @@ ALONE_COLUMNS = (
     "grasps",
     "held, %: μ in the middle, at rest",
     "β₁, β₂",
+    "known, %: β₁, β₂",
     "half-width of β₁, s/m",
     "of μ in the middle, %",
 )
@@ -77,12 +78,14 @@ def row(places: int, seeds: Sequence[int]) -> list[object]:
 
 class Alone(NamedTuple):
     """One grasp by itself: which 95 % intervals hold the law, of friction in the ``middle`` of its data and at ``rest``
-    and of both ``slopes``, and half-widths of β₁ and, as a part of it, of friction in the middle.
+    and of both ``slopes``, whether these count as ``known``, and half-widths of β₁ and, as a part of it, of friction in
+    the middle.
     """
 
     middle: bool
     rest: bool
     slopes: NDArray[np.bool_]
+    known: NDArray[np.bool_]
     width: float
     part: float
 
@@ -98,20 +101,22 @@ def alone(seed: int, places: int, lasting: float) -> Alone:
         held.append(abs(float(model.predict(v, f_n)) - LAW @ [1.0, v, f_n]) <= half)
     low, high = model.interval()[1:].T
     slopes = (low <= LAW[1:]) & (high >= LAW[1:])
-    return Alone(*held, slopes, 0.5 * float(high[0] - low[0]), float(uncertainty(model, *middle)))
+    width, part = 0.5 * float(high[0] - low[0]), float(uncertainty(model, *middle))
+    return Alone(*held, slopes, model.identifiable[1:], width, part)
 
 
 def row_alone(places: int, lasting: float, seeds: Sequence[int]) -> list[object]:
     """Of all grasps by themselves with so many places, in which errors last so long."""
     found = [alone(seed, places, lasting) for seed in seeds]
     friction = [100.0 * np.mean([each.middle for each in found]), 100.0 * np.mean([each.rest for each in found])]
-    slopes = 100.0 * np.mean([each.slopes for each in found], axis=0)
+    slopes, known = (100.0 * np.mean([part[k] for part in found], axis=0) for k in (2, 3))
     return [
         places,
         f"{-1.0 / np.log(lasting):.0f}" if lasting else "0",
         len(found),
         " ".join(f"{share:.0f}" for share in friction),
         " ".join(f"{share:.0f}" for share in slopes),
+        " ".join(f"{share:.0f}" for share in known),
         f"{np.median([each.width for each in found]):.1f}",
         f"{100.0 * np.median([each.part for each in found]):.0f}",
     ]
@@ -126,8 +131,7 @@ def main() -> None:
     arguments.output.mkdir(parents=True, exist_ok=True)
     rows = [row(places, range(arguments.first, arguments.first + arguments.sets)) for places in PLACES]
     seeds = range(arguments.first, arguments.first + ALONE_SETS * arguments.sets)
-    cases = [(1, lasting) for lasting in ALONE] + [(places, LASTING) for places in FEW_PLACES[1:]]
-    single = [row_alone(*case, seeds) for case in cases]
+    single = [row_alone(places, lasting, seeds) for places in FEW_PLACES for lasting in ALONE]
     tables = {"lasting errors": table(COLUMNS, rows), "lasting errors of one grasp": table(ALONE_COLUMNS, single)}
     for each in tables.values():
         print(each, end="\n\n")

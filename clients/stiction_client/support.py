@@ -36,7 +36,7 @@ OTHERS_GELS = "others_gels"
 RECONSTRUCTED_FORCES = "reconstructed_forces"
 """Diagnostic, a sentence: how many of a material's logs have forces that no sensor measured."""
 ONE_RECORD = "one_record"
-"""Diagnostic, a sentence: all samples are of one grasp at one place, and why no slope is known of them."""
+"""Diagnostic, a sentence: all samples are of one grasp, and why slopes are not known of them."""
 NOTES = (
     WEAKENING,
     ONE_RECORD,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import LINEAR
+from estimators.defaults import CLUSTERS, LINEAR
 from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
@@ -68,6 +68,19 @@ class FitData:
         grasps = [grasp for block in self.blocks for grasp in block.grasps]
         return self.cluster_kind == "none" and len(grasps) == 1 and grasps[0].of_one_place
 
+    def places_leave_open(self) -> bool:
+        """Whether all samples are of one grasp at several places, too few to show what their lasting errors do.
+
+        What they say of a slope is then less than ``few_places`` of what they would say beside many grasps.
+        """
+        if self.cluster_kind not in {"element", "none"}:
+            return False
+        grasps = self._statistics()
+        if len(grasps) != 1 or grasps[0].of_one_place or grasps[0].alone is None:
+            return False
+        alone, several = (np.square(part[:, :2]).sum(axis=0) for part in (grasps[0].alone, grasps[0].within))
+        return bool((alone < CLUSTERS.few_places * several).any())
+
     def centred_rows(self) -> FloatArray:
         """Four rows a grasp, [g, 4, 4], in (1, v, f_n, μ) about the common mean, with all its sums of squares."""
         whole = self.blocks[0].merge(*self.blocks[1:])
@@ -83,12 +96,14 @@ class FitData:
         return np.array([1.0, *self.factor.mean[:2]], dtype=float)
 
     def grasp_statistics(self) -> tuple[GraspStatistics, ...]:
-        """Each grasp place by place; moments that know of no places count as those of one."""
+        """Each grasp place by place, as one of so many; moments that know of no places count as those of one."""
+        grasps = self._statistics()
+        return tuple(grasp.among(len(grasps)) for grasp in grasps)
+
+    def _statistics(self) -> tuple[GraspStatistics, ...]:
         if self.observations is not None:
-            grasps = _statistics_of_samples(self.observations)
-        else:
-            grasps = tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
-        return tuple(grasp.by_itself for grasp in grasps) if self.of_one_record else grasps
+            return _statistics_of_samples(self.observations)
+        return tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
 
     def kept(self, rows: NDArray[np.bool_]) -> "FitData":
         """The data of some of the samples only."""

@@ -46,8 +46,8 @@ class GraspStatistics:
     Groups [g] of places: ``count`` places of about the same ``weight`` Σw each, the weighted ``mean`` [g, 3] of
     (v, f_n, μ), and the triangular factor ``spread`` [g, 3, 3] of the places' means about it, which is zero where a
     group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places,
-    freed of noise and of errors that go together; ``alone`` the same of one place without another grasp to compare its
-    slopes with, whose errors may last for longer than shows by itself (``lasting_errors``); None of several places.
+    freed of noise and of errors that go together; ``alone`` the same without another grasp, where few places leave open
+    how errors last (``slopes_of_places``); None where it was not stored.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
     that relative to what seems to stick, and counts as 0. ``share``: the part of the places that they count as, where
     neighbours are off alike (``place_correlation``). ``sensor``: the name of the grasp's sensor, "" where it is not
@@ -68,10 +68,18 @@ class GraspStatistics:
     sensor: str = ""
     alone: FloatArray | None = None
 
-    @property
-    def by_itself(self) -> "GraspStatistics":
-        """The same where no other grasp is there."""
-        return self if self.alone is None else replace(self, within=self.alone)
+    def among(self, grasps: int) -> "GraspStatistics":
+        """The same as one of so many grasps: the more there are, the less depends on how few places each of them has.
+
+        What few places leave open shrinks as all places of all grasps: of a variance that is up to twice as large
+        alone, about a part 1/grasps. One place among several shows by its slopes alone how errors last
+        (``slopes_of_grasps``).
+        """
+        if self.alone is None or (self.of_one_place and grasps > 1):
+            return self
+        part = 2.0 / (grasps + 1.0)
+        rows = [np.sqrt(1.0 - part) * self.within, np.sqrt(part) * self.alone]
+        return replace(self, within=np.asarray(upper_triangle(np.concatenate(rows)), dtype=float))
 
     @property
     def independent(self) -> FloatArray:
@@ -98,9 +106,7 @@ class GraspStatistics:
         sums = np.bincount(place, weight).astype(float)
         mean = np.stack([np.bincount(place, weight * column) for column in offset.T], axis=1) / sums[:, None]
         left = weight.sum() * max(1.0 - len(sums) / len(weight), 0.0)
-        deviates = values, offset - mean[place], weight, time, noise * np.sqrt(left)
-        within = within_places(*deviates)
-        alone = within_places(*deviates, alone=True) if len(sums) == 1 else None
+        within, alone = within_places(values, offset - mean[place], weight, time, noise * np.sqrt(left), place)
         share = 1.0
         if element is not None and left > 0.0:
             label = np.zeros(len(sums), dtype=np.int64)

@@ -1,9 +1,11 @@
-"""Errors of a record that last: how those of its stretches of time go together, by restricted likelihood.
+"""Errors of a grasp that last: how those of a place's stretches of time go together, by restricted likelihood.
 
 Where errors last for a part of the record, what is left of them after a fit goes together less than they do: the fit
 takes up what looks like its slopes. The likelihood of what no slope can take up (Patterson & Thompson, 1971, Biometrika
 58:545; Harville, 1977, Journal of the American Statistical Association 72:320) allows for that.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,41 +15,53 @@ from estimators.defaults import CLUSTERS, LASTING, OWN_SHARES
 FloatArray = NDArray[np.float64]
 
 SPARE = 3
-"""Stretches beyond what a fit of their levels takes up, from which the mean of their variance exists."""
+"""Levels beyond what a fit of them takes up, from which the mean of their variance exists."""
+LASTS = np.array([1.0, *(lasts for lasts in LASTING for _ in OWN_SHARES)])
+OWN = np.array([1.0, *(own for _ in LASTING for own in OWN_SHARES)])
+"""How long errors last and the part of their variance that each stretch has for itself; first all of it."""
 
 
-def covariance_of_levels(level: FloatArray, design: FloatArray, weight: FloatArray) -> FloatArray:
-    """Covariance [b, b] of the errors in the ``level`` [b] of each of b stretches, in their order and alike long.
-
-    ``design`` [b, p]: orthonormal columns of what levels may follow that is no error; ``weight`` [b] of each. Errors
-    are each stretch's own, as independent samples make them, or a part is, and the rest falls off exponentially with
-    the time between stretches. How long it lasts and how large the part is (``LASTING``, ``OWN_SHARES``, each as
-    likely before) are averaged over what the levels say of them, and the variance over a prior 1/σ². Takes at least
-    p + ``SPARE`` stretches.
+class LevelErrors(NamedTuple):
+    """Covariances of the errors in the levels of p places: of those that are ``own`` to each of b stretches, [p, b],
+    and of those that are ``lasting``, [b, b], the same in each place.
     """
-    correlation = _correlations(weight)
-    root = np.linalg.cholesky(correlation)
-    white = np.linalg.solve(
-        root, np.broadcast_to(np.column_stack([design, level]), (*root.shape[:2], len(design.T) + 1))
-    )
-    along, taken = np.linalg.qr(white[..., :-1])
-    left = white[..., -1] - np.einsum("mbp,mcp,mc->mb", along, along, white[..., -1])
-    degrees = level.size - design.shape[1]
-    square = np.maximum(np.square(left).sum(axis=1), np.finfo(float).tiny)
-    log_weight = -0.5 * degrees * np.log(square) - _log_size(root) - _log_size(taken)
-    log_weight[0] += np.log(CLUSTERS.independent / (1.0 - CLUSTERS.independent) * (len(log_weight) - 1))
+
+    own: FloatArray
+    lasting: FloatArray
+
+
+def errors_of_levels(level: FloatArray, design: FloatArray, weight: FloatArray) -> LevelErrors:
+    """Of the ``level`` [p, b] of each of b stretches of p places, alike long and in their order.
+
+    Of a level of ``weight`` [p, b] 0 nothing was seen. ``design`` [p, b, d]: columns of full rank of what the levels of
+    all places may follow, beside the mean of each place, that is no error. Errors of places are independent. Those of
+    one are each stretch's own, as independent samples make them, or a part is, and the rest falls off exponentially
+    with the time between stretches. How long it lasts and how large the part is (``LASTING``, ``OWN_SHARES``, each as
+    likely before) are averaged over what the levels say of them, and the variance over a prior 1/σ². Takes at least
+    p + d + ``SPARE`` levels.
+    """
+    from estimators.linear.whitened_levels import whitened  # numba takes a while to load
+
+    seen = weight > 0.0
+    own = np.divide(weight[seen].mean(), weight, out=np.zeros_like(weight), where=seen)
+    rows = np.concatenate([np.ones((*level.shape, 1)), design, level[..., None]], axis=2)
+    products, log_size = whitened(np.ascontiguousarray(rows), np.ascontiguousarray(own), np.exp(-1.0 / LASTS), OWN)
+    square, log_taken = _left(products)
+    degrees = np.count_nonzero(seen) - len(level) - design.shape[2]
+    square = np.maximum(square, np.finfo(float).tiny)
+    log_weight = -0.5 * degrees * np.log(square) - log_size - log_taken
+    log_weight[0] += np.log(CLUSTERS.independent / (1.0 - CLUSTERS.independent) * (len(LASTS) - 1))
     likely = np.exp(log_weight - log_weight.max())
-    return np.asarray(np.tensordot(likely / likely.sum() * square / (degrees - 2), correlation, 1))
+    variance = likely / likely.sum() * square / (degrees - 2)
+    apart = np.abs(np.subtract.outer(np.arange(level.shape[1]), np.arange(level.shape[1])))
+    lasting = np.tensordot(variance * (1.0 - OWN), np.exp(-apart / LASTS[:, None, None]), 1)
+    return LevelErrors(variance @ OWN * own, np.asarray(lasting))
 
 
-def _correlations(weight: FloatArray) -> FloatArray:
-    """Of independent errors, and of those that last for each time and are their own to each part, [1 + m, b, b]."""
-    apart = np.abs(np.subtract.outer(np.arange(len(weight)), np.arange(len(weight))))
-    lasting = np.exp(-apart / np.array(LASTING)[:, None, None])
-    own, share = np.diag(weight.mean() / weight), np.array(OWN_SHARES)[:, None, None, None]
-    return np.concatenate([own[None], ((1.0 - share) * lasting + share * own).reshape(-1, *apart.shape)])
-
-
-def _log_size(triangle: NDArray[np.floating]) -> FloatArray:
-    """Logarithm of the size of the determinants of triangles [m, k, k], [m]."""
-    return np.asarray(np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(axis=1))
+def _left(products: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of the ``products`` [m, c, c] of columns, the square [m] of the last one with all others taken out, and the
+    logarithm [m] of the size of what is taken.
+    """
+    taken, along = products[:, :-1, :-1], products[:, :-1, -1:]
+    square = products[:, -1, -1] - (along * np.linalg.solve(taken, along)).sum(axis=(1, 2))
+    return square, np.asarray(0.5 * np.linalg.slogdet(taken)[1])

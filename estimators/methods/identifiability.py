@@ -13,6 +13,10 @@ ONE_RECORD_ADVICE = (
     "all samples are of one grasp at one place, in which an error that lasts looks like an effect of velocity or of "
     "normal force: to know beta1 and beta2 record several grasps, or more places at once"
 )
+FEW_PLACES_ADVICE = (
+    "all samples are of one grasp, at places too few to show what errors that last in each of them do to beta1 and "
+    "beta2: to know these record several grasps, or more places at once"
+)
 
 
 def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) -> FloatArray:
@@ -36,3 +40,10 @@ def identifiable(effect: FloatArray, prior_shift: FloatArray, *, of_one_record: 
     """
     known = (effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift)
     return np.asarray(known & np.array([True, not of_one_record, not of_one_record]))
+
+
+def what_to_record(known: NDArray[np.bool_], data: FitData) -> str | None:
+    """In a sentence, where it is one grasp whose errors may last that leaves slopes unknown."""
+    if data.of_one_record:
+        return ONE_RECORD_ADVICE
+    return FEW_PLACES_ADVICE if not known[1:].all() and data.places_leave_open() else None

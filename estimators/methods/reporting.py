@@ -18,7 +18,7 @@ from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
-from estimators.methods.identifiability import ONE_RECORD_ADVICE, effects, identifiable
+from estimators.methods.identifiability import effects, identifiable, what_to_record
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, SENSOR_GAIN
 
@@ -119,7 +119,6 @@ def _difference(weight: FloatArray, gains: Gains, first: int, second: int) -> tu
 def describe(data: FitData, linear: LinearFit) -> Diagnostics:
     """The data: how many, in how many clusters, and how well they spread over v and f_n."""
     remarks: Diagnostics = {"unknown_velocity": in_words(data)} if data.unknown_velocity > 0.0 else {}
-    remarks |= {ONE_RECORD: ONE_RECORD_ADVICE} if data.of_one_record else {}
     return remarks | {
         "effective_n": data.effective_n,
         "clusters": float(data.clusters),
@@ -151,6 +150,9 @@ def report(
     effect = effects(found.covariance, found.degrees_of_freedom, data)
     effect[1] *= slope_inflation(data, linear)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
+    known = identifiable(effect, prior_shift, of_one_record=data.of_one_record)
+    advice = what_to_record(known, data)
+    diagnostics = diagnostics | ({ONE_RECORD: advice} if advice else {})
     return FrictionModel(
         method=method,
         coefficients=np.asarray(found.coefficients, dtype=float),
@@ -159,7 +161,7 @@ def report(
         n=data.n,
         degrees_of_freedom=found.degrees_of_freedom,
         domain=data.domain,
-        identifiable=identifiable(effect, prior_shift, of_one_record=data.of_one_record),
+        identifiable=known,
         element_area=data.element_area,
         diagnostics=describe(data, linear) | by_coefficient("effect", effect) | diagnostics,
         cost=Cost(time.perf_counter() - begin, found.monte_carlo_error),

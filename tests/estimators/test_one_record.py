@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import estimators
+from benchmarks.estimators import lasting_errors
 from estimators.method_names import METHODS
-from estimators.methods.identifiability import ONE_RECORD_ADVICE
+from estimators.methods.identifiability import FEW_PLACES_ADVICE, ONE_RECORD_ADVICE
 from slipcore.samples import FrictionSamples
 from stiction_client import FrictionModel, InvalidArgument, conservative_friction
 from stiction_client.support import ONE_RECORD
@@ -62,3 +63,37 @@ def test_what_a_planner_exports_is_refused_unless_allowed(samples: Make, method:
     with pytest.raises(InvalidArgument, match="not identified"):
         conservative_friction(model, force)
     assert 0.0 < conservative_friction(model, force, allow_unidentified=True) < 0.6
+
+
+@pytest.mark.parametrize("places", [2, 3, 10])
+def test_slopes_of_places_whose_errors_last_are_held_where_they_count_as_known(places: int) -> None:
+    """By intervals of 95 %; in half of the grasps, were stretches of time independent."""
+    held = []
+    for seed in range(40):
+        data = lasting_errors.grasp(np.random.default_rng([seed, places]), places)
+        low, high = estimators.fit(estimators.Moments.from_samples(data), method="hierarchical").interval().T
+        held.append((low <= lasting_errors.LAW) & (high >= lasting_errors.LAW))
+    assert (np.mean(held, axis=0) >= 0.9).all()
+
+
+@pytest.mark.parametrize("method", ["hierarchical", "bayes", "auto"])
+def test_two_places_whose_errors_last_say_to_record_more(method: str) -> None:
+    data = lasting_errors.grasp(np.random.default_rng(0), 2, error=0.05)
+    model = estimators.fit(estimators.Moments.from_samples(data), method=method)
+    assert not model.identifiable[1:].all()
+    assert FEW_PLACES_ADVICE in model.notes
+
+
+def test_two_places_whose_errors_are_independent_determine_slopes(samples: Make) -> None:
+    for seed in range(5):
+        model = estimators.fit(estimators.Moments.from_samples(record(samples, seed, places=2)), method="auto")
+        assert model.identifiable[1:].all()
+        assert ONE_RECORD not in model.diagnostics
+
+
+def test_what_few_places_leave_open_shrinks_with_the_number_of_grasps() -> None:
+    moments = estimators.Moments.from_samples(lasting_errors.grasp(np.random.default_rng(1), 2))
+    told = [np.linalg.norm(moments.grasps[0].among(grasps).within[:2, :2]) for grasps in (1, 2, 5, 1000)]
+    assert told == sorted(told)
+    assert told[0] < 0.9 * told[-1]
+    assert told[-1] == pytest.approx(np.linalg.norm(moments.grasps[0].within[:2, :2]), rel=1e-2)

@@ -1,6 +1,9 @@
 """After warming up, no fit compiles."""
 
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 import estimators
 from slipcore.samples import FrictionSamples
@@ -9,9 +12,13 @@ from slipcore.samples import FrictionSamples
 def test_after_warming_up_no_fit_compiles(samples: Callable[..., FrictionSamples]) -> None:
     assert estimators.warm_up() >= 0.0
     from estimators.likelihoods import kernels
+    from estimators.linear.whitened_levels import whitened
 
-    sums = (kernels.sum_log1p_square, kernels.sum_log_mixture, kernels.sum_log_normal)
+    sums = (kernels.sum_log1p_square, kernels.sum_log_mixture, kernels.sum_log_normal, whitened)
     compiled = [len(kernel.signatures) for kernel in sums]
     for likelihood in ("student_t", "outlier", "errors_in_variables"):
         estimators.fit(samples(1000), method="bayes", likelihood=likelihood, accuracy=0.1)
-    assert [len(kernel.signatures) for kernel in sums] == compiled == [1, 1, 1]
+    places = replace(samples(1000), element=np.arange(1000) % 5, time=np.arange(1000.0))
+    for data in (places, [places, places], estimators.Moments.from_samples(places)):
+        estimators.fit(data, method="hierarchical")
+    assert [len(kernel.signatures) for kernel in sums] == compiled == [1, 1, 1, 1]
