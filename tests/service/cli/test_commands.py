@@ -17,6 +17,7 @@ import httpx
 import numpy as np
 import pytest
 
+import slipcore
 from benchmarks.calibration.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
@@ -27,11 +28,12 @@ from service.cli import app, main, progress, streaming
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.settings import Settings
-from slipcore import GraspLog, contact, detect_slip
+from slipcore import GraspLog, contact, detect_slip, forces
 from slipcore.contact import tangential_ramp
 from slipcore.contact.errors import Interrupted
 from slipcore.contact.tiers.ramp import RampSchedule
 from stiction_client import FrictionClient, container
+from tests.service.remembered import remembering
 
 WRONG_USAGE = 2
 Run = Callable[..., tuple[int, str, str]]
@@ -50,6 +52,13 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
         return int(ending.value.code or 0), out, err
 
     return command
+
+
+@pytest.fixture(scope="module", autouse=True)
+def worked_out_once() -> Iterator[None]:
+    """Slip in the same few logs, findings, and forces by a gel."""
+    with remembering((slipcore, "detect_slip"), (slipcore, "check_log"), (forces, "reconstruct")):
+        yield
 
 
 @pytest.fixture(scope="module")
