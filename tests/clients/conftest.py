@@ -237,7 +237,7 @@ def grasp() -> GraspLog:
 @pytest.fixture(scope="session")
 def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Address of a real service on a free loopback port, in a thread (its workers are processes)."""
-    app = create_app(Settings(data_folder=tmp_path_factory.mktemp("served")))
+    app = create_app(Settings(data_folder=tmp_path_factory.mktemp("served"), poll_seconds=5.0))
     server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", ws="none"))
     thread = threading.Thread(target=server.run)
     thread.start()

@@ -86,7 +86,7 @@ def presses(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.fixture(scope="module")
 def url(tmp_path_factory: pytest.TempPathFactory, serving: Serving) -> Iterator[str]:
-    with serving(Settings(data_folder=tmp_path_factory.mktemp("service"))) as client:
+    with serving(Settings(data_folder=tmp_path_factory.mktemp("service"), poll_seconds=5.0)) as client:
         yield str(client.base_url)
 
 
