@@ -134,7 +134,8 @@ def _detected(session: DetectorSession, frame: Frame) -> tuple[SlipState, dict[s
         session.detector.set_options(**for_reconstructed_forces(session.forces.deviation))
     state = session.detector.step(*frame)
     try:
-        return state, None if session.grip is None else session.grip.step(frame, state)
+        sampled = None if session.forces is None else session.forces.sampled
+        return state, None if session.grip is None else session.grip.step(frame, state, sampled)
     except InvalidInput:
         session.detector.state = before
         raise

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import estimators
@@ -33,25 +34,32 @@ def plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None:
     session.until_look -= 1
     if session.until_look == 0:
         session.until_look = STRIDE
-        noise = None if session.forces is None or session.forces.stream is None else session.forces.noise
-        given = session.frames, session.answers, session.detector.state, noise
+        options = {} if session.forces is None or session.forces.stream is None else session.forces.of_samples
+        given = session.frames, session.answers, session.detector.state, options
         session.look = _LOOKS.of(session.limit.owner).submit(_look, session, *given)
 
 
 def _look(
-    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+    session: DetectorSession,
+    frames: list[Frame],
+    answers: list[SlipState],
+    state: "DetectorState",
+    options: Mapping[str, float],
 ) -> None:
     try:
-        _find_friction(session, frames, answers, state, noise)
+        _find_friction(session, frames, answers, state, options)
     except Exception:  # costs the stream this second's friction, and nothing else
         logger.exception("a look for friction failed")
 
 
 def _find_friction(
-    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+    session: DetectorSession,
+    frames: list[Frame],
+    answers: list[SlipState],
+    state: "DetectorState",
+    options: Mapping[str, float],
 ) -> None:
-    """The samples since the last look, merged with those before; ``noise`` N of forces that are reconstructed."""
-    options = {} if noise is None else {"force_noise": noise}
+    """The samples since the last look, merged with those before; ``options`` of samples of reconstructed forces."""
     samples = collect_samples(log_of(session, frames, "", {}), slipcore.collect_history(answers, state), **options)
     end = frames[-1].time  # which has no next frame yet, so it is the next look's
     new = (samples.time >= session.looked_until) & (samples.time < end)

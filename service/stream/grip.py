@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from service.stream.messages import Control
-from service.stream.observing import Observer
+from service.stream.observing import Observer, SampledForces
 from slipcore import Frame, InvalidInput, SlipState
 from slipcore.frames import FloatArray
 from stiction_client import Contact, ControlSettings, FrictionModel, GraspController, InvalidArgument
@@ -32,10 +32,12 @@ class Grip:
         with _named():
             self._state = GraspController.init(settings_of(control), model, materials)
 
-    def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
-        """The command after a frame, as it is sent; raises ``InvalidInput`` for what the controller cannot take."""
+    def step(self, frame: Frame, found: SlipState, sampled: SampledForces | None = None) -> dict[str, Any]:
+        """The command after a frame, as it is sent, with friction of forces that are to be ``sampled`` where these are
+        not the frame's; raises ``InvalidInput`` for what the controller cannot take.
+        """
         with _named():
-            observer, seen = self._observer.step(frame, found)
+            observer, seen = self._observer.step(frame, found, sampled)
             self._state, command = GraspController.step(self._state, seen)
         self._observer = observer
         return asdict(command)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,15 @@ LEAST_SHARE = 0.1
 UP = np.array([0.0, 0.0, 1.0])
 
 
+class SampledForces(NamedTuple):
+    """Reconstructed forces of a frame for friction samples: ``force`` [n, m, 3] N whose tangential and normal parts are
+    averaged alike, and the ``least`` normal force N of an element for one.
+    """
+
+    force: FloatArray
+    least: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Observer:
     """What turns the frames of one sensor into observations: the ``position`` [n, m, 3] m of its markers at rest, the
@@ -31,11 +41,14 @@ class Observer:
     last: tuple[SlipState, ...] = ()
     beside: FloatArray = field(default_factory=lambda: np.zeros(4))
 
-    def step(self, frame: Frame, found: SlipState) -> tuple["Observer", Observation]:
+    def step(
+        self, frame: Frame, found: SlipState, sampled: SampledForces | None = None
+    ) -> tuple["Observer", Observation]:
         """A frame with forces, and what the detector says of it: the observer after it, and the observation.
 
         Resultants are over the contact and the elements beside it. Forces that are not known (NaN) are left out. The
-        torque is about the centre of what presses.
+        torque is about the centre of what presses. Friction is that of the frame's forces, or of those that are to be
+        ``sampled``.
         """
         assert frame.force is not None
         known = np.nan_to_num(frame.force)
@@ -46,17 +59,18 @@ class Observer:
         beside = self.beside + (rim - self.beside) / len(last) if found.contact.any() else np.zeros(4)
         after = replace(self, last=last, beside=beside)
         x, y, z, moment = (_resultant(places, force) + after.beside).tolist()
-        samples = after._samples(force, frame.normal)
+        samples = after._samples(SampledForces(known, 0.0) if sampled is None else sampled, found.contact, frame.normal)
         return after, Observation(frame.time, max(-z, 0.0), math.hypot(x, y), abs(moment), found.stick_ratio, samples)
 
-    def _samples(self, force: FloatArray, normal: FloatArray | None) -> SlipSamples | None:
+    def _samples(self, of: SampledForces, contact: BoolArray, normal: FloatArray | None) -> SlipSamples | None:
         """Friction where elements slip: well pressed, slipping for ``WINDOW`` frames, and fast enough to be seen."""
         slips = np.logical_and.reduce([state.slip for state in self.last])
         if len(self.last) < WINDOW or not slips.any():
             return None
+        force = np.where(contact[..., None], of.force, 0.0)
         forces = element_forces(force, np.broadcast_to(UP, force.shape) if normal is None else normal)
         velocity = np.nan_to_num(np.mean([state.velocity for state in self.last], axis=0))
-        pressed = forces.pressing > LEAST_SHARE * forces.pressing.max()
+        pressed = forces.pressing > max(LEAST_SHARE * forces.pressing.max(), of.least)
         slips &= pressed
         use = slips & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
         if not use.any():

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from service.domain.sensors.reconstruct import at_end_of_range, contradicted
 from service.processes.fair_executor import FairExecutor
+from service.stream.observing import SampledForces
 from slipcore import Frame, InvalidInput
 
 if TYPE_CHECKING:
@@ -37,19 +38,26 @@ class Reconstructing:
     """Forces of one session, by its sensor's ``gel`` (``slipcore.forces.Gel.from_json``).
 
     The first frame decides: with forces in it none are reconstructed, else there is a ``stream`` of them, or it is
-    ``refused`` with this reason. Its contacts are sought in turns with those of other ``owner``s. ``noise`` N of normal
-    forces on elements in contact, as of the last frame with any; ``deviation`` N of forces in the last frame, by which
-    a detector goes; ``alike``: forces of the last frame as friction samples are collected from them.
+    ``refused`` with this reason. Its contacts are sought in turns with those of other ``owner``s. ``deviation`` N of
+    forces in the last frame, by which a detector goes; ``alike``: forces of the last frame as friction samples are
+    collected from them, with the options ``of_samples`` as of the last frame in which anything touched.
     """
 
     gel: Mapping[str, Any]
     owner: str
     stream: "ForceStream | None" = None
     refused: str | None = None
-    noise: float = 0.0
     deviation: float = 0.0
     failures: int = 0
     alike: NDArray[np.float64] | None = None
+    of_samples: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def sampled(self) -> SampledForces | None:
+        """Forces of the last frame as a grip controller samples friction from them, if any are reconstructed."""
+        if self.stream is None or self.alike is None:
+            return None
+        return SampledForces(self.alike, self.of_samples["force_to_noise"] * self.of_samples["force_noise"])
 
     @property
     def held_bytes(self) -> int:
@@ -107,7 +115,9 @@ class Reconstructing:
             return self._without_look(frame, gripper_force, deviation)
         forces = found.forces
         self.alike = forces.alike
-        self.noise, self.deviation = forces.force_noise or self.noise, found.force_deviation
+        self.deviation = found.force_deviation
+        if forces.contact.any() or not self.of_samples:
+            self.of_samples = forces.of_samples
         findings = [*at_end_of_range(found.saturated), *contradicted(self.stream.contradicted)]
         report = {
             "source": "reconstructed",

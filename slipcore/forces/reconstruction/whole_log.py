@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
-from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.kernel import ResolutionKernel
 from slipcore.forces.inverse.strength import Criterion
@@ -15,7 +14,7 @@ from slipcore.forces.inverse.whole_lattice import WholeLattice
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.reconstruction.height import at_points
 from slipcore.forces.recording import DisplacementData, error, rows
-from slipcore.forces.tracking.frame_forces import FrameForces, Reader, typical_deviation
+from slipcore.forces.tracking.frame_forces import FrameForces, Reader, sample_options, typical_deviation
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.over_time import ContactRun, runs
 from slipcore.forces.tracking.sensor import SensorResponse
@@ -103,7 +102,7 @@ class Reconstruction:
     @property
     def of_samples(self) -> dict[str, float]:
         """Options of friction samples by these forces."""
-        return {"force_noise": self.force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
+        return sample_options(self.force_noise)
 
 
 def reconstruct(

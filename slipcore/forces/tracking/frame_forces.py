@@ -38,6 +38,11 @@ class FrameForces:
         """As of a ``Reconstruction``, N."""
         return typical_deviation(self.deviation, self.contact)
 
+    @property
+    def of_samples(self) -> dict[str, float]:
+        """As of a ``Reconstruction``."""
+        return sample_options(self.force_noise)
+
     @classmethod
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
         """Of a frame of which nothing is known yet."""
@@ -182,6 +187,11 @@ def typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:
     """Median ``deviation`` [..., 3] N of normal forces on elements in ``contact`` [...], 0 without."""
     touching = deviation[..., 2][contact]
     return float(np.median(touching)) if touching.size else 0.0
+
+
+def sample_options(force_noise: float) -> dict[str, float]:
+    """Options of friction samples by forces with this noise N of an element's normal force."""
+    return {"force_noise": force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
 
 
 def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:

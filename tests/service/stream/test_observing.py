@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.stream.observing import LEAST_SPEED, WINDOW, Observer
+from service.stream.observing import LEAST_SPEED, WINDOW, Observer, SampledForces
 from slipcore import Frame, SlipState
 
 GRID = (1, 4)
@@ -152,3 +152,18 @@ def test_the_rim_adds_its_mean_over_some_frames_so_that_its_noise_hardly_counts(
     np.testing.assert_allclose(told[WINDOW:], 3.5, atol=0.1 / WINDOW)
     away = replace(state(), contact=NO)
     assert observer.step(frame(noisy), away)[1].normal == 0.0  # nothing touches, so that nothing is beside it
+
+
+def test_friction_is_of_the_forces_that_are_to_be_sampled_and_resultants_of_the_frame_s() -> None:
+    """Of the two that slip the first presses with no more than the least force for a sample, and the third, which does
+    not touch, presses with most.
+    """
+    alike = FORCE * [1.0, 1.5, 1.0]
+    alike[0, 2, 2] = -90.0
+    observer = Observer(PLACE)
+    for _ in range(WINDOW):
+        observer, seen = observer.step(frame(), state(TOUCH, 1e-3), SampledForces(alike, 1.0))
+    assert seen.slip_samples is not None
+    np.testing.assert_allclose(seen.slip_samples.friction_coefficient, [0.3])
+    np.testing.assert_allclose(seen.slip_samples.normal_force, [2.0])
+    assert seen.tangential == pytest.approx(0.5)

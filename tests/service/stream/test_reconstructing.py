@@ -11,10 +11,13 @@ from service.domain.sensors.reconstruct import CONTRADICTED
 from service.formats import read
 from service.stream import detector_session, detectors, friction_looks, reconstructing
 from service.stream.detector_session import PackedFrame
+from service.stream.grip import Grip
 from service.stream.messages import Control
-from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
+from service.stream.observing import SampledForces
+from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples, detect_slip
 from slipcore.defaults import FilterOptions
 from slipcore.forces import ForceStream
+from slipcore.forces.defaults import RECONSTRUCTION
 
 pytestmark = pytest.mark.usefixtures("looks_at_once")
 
@@ -50,16 +53,26 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
 
     def collected(*arguments: Any, **options: float) -> FrictionSamples:
         assert 1e-3 < options["force_noise"] < 1e-2
+        assert options["force_to_noise"] == RECONSTRUCTION.force_to_noise
         found.append(collect_samples(*arguments))
         return found[-1]
 
+    sampled: list[SampledForces | None] = []
+
+    def stepped(grip: Grip, frame: Frame, state: SlipState, of: SampledForces | None) -> dict[str, Any]:
+        sampled.append(of)
+        return step_grip(grip, frame, state, of)
+
+    step_grip = Grip.step
+    monkeypatch.setattr(Grip, "step", stepped)
     monkeypatch.setattr(friction_looks, "collect_samples", collected)
     session = opened(ramp, control=GRIP)
     reports = -ramp.force[..., 2].sum(axis=(1, 2))
     answers = [detectors.step("one", frame(ramp, k, gripper_force=reports[k]))[0] for k in range(len(ramp))]
     assert session.forces is not None
     assert isinstance(options := session.detector.state.setup.options, FilterOptions)
-    assert options.force_floor == session.forces.deviation == session.forces.noise  # as unsure as samples' forces
+    noise = session.forces.of_samples["force_noise"]
+    assert options.force_floor == session.forces.deviation == noise  # as unsure as samples' forces
     assert options.heading_length > 0.0 == FilterOptions().heading_length
     assert [answer["force"]["wait_for"] for answer in answers[:14]] == ["noise"] * 14
     history = detect_slip(ramp)
@@ -75,6 +88,9 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
     assert 0.0 < np.median(contradictions) < 3.0
     assert answers[-1]["command"]["normal_force"] > 0.5
     np.testing.assert_array_equal(session.frames[-1].force, session.forces.alike)  # samples are of these
+    assert sampled[-1] is not None
+    np.testing.assert_array_equal(sampled[-1].force, session.forces.alike)  # the grip controller's, too
+    assert sampled[-1].least == RECONSTRUCTION.force_to_noise * noise
     assert session.look is not None
     session.look.result()
     assert np.median(found[-1].friction_coefficient) == pytest.approx(0.4, rel=0.05)
