@@ -172,12 +172,12 @@ class ReconstructionDefaults(Options):
     node_share: Annotated[float, Option(0.0, 1.0, "-", "bilinear pressures overshoot by so much")] = 0.03
     """Of the frame's largest pressure, above which a node may be in contact."""
     element_significance: Annotated[float, Option(0.0, 100.0, "standard deviations", "2 σ")] = 2.0
-    """Of an element's normal force, above which it is said to be in contact."""
+    """Of an element's normal force or shear, above which it is said to be in contact."""
     element_share: Annotated[float, Option(0.0, 1.0, "-", "scenes: the rim of Hertz's pressure")] = 0.06
-    """Of the frame's largest normal force, above which an element is said to be in contact."""
+    """Of the frame's largest normal force or shear, above which an element is said to be in contact."""
     rim_share: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.15
-    """Of the largest normal force around an element, above which it is said to be in contact: else all that a contact
-    covers a little would count."""
+    """Of the largest normal force or shear around an element, above which it is said to be in contact: else all that a
+    contact covers a little would count."""
     least_coupling: Annotated[float, Option(0.0, 10.0, "-", "ν 0.49: half-space 0.01, 5 mm 0.1 to 0.3")] = 0.03
     """Motion of markers in the plane by a pressure over that by a shear, from which on they show where it presses."""
     covered: Annotated[float, Option(0.0, 1.0, "-", "its marker then lies inside")] = 0.5

@@ -19,7 +19,6 @@ from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.look import ContactTracking, MarkerReading, bytes_needed
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
-from slipcore.markers import taken_along
 from slipcore.saturation import RangeWatch
 
 
@@ -31,8 +30,8 @@ class StreamedForces:
     "noise", "set-up" or "contact". ``given``: whether they are by the gripper's force, too, and ``contradiction`` by
     how many standard deviations this differs from what is found; NaN without one, and while markers have moved on from
     where the contact was last sought. ``saturated``: how many elements show displacement at the end of the sensor's
-    range, by the frames until then; it counts as not seen. What ``Reconstruction.apply`` says to a detector of a log:
-    ``contact`` [n, m], None where it is by the forces, and the ``force_deviation`` N of these.
+    range, by the frames until then; it counts as not seen. ``force_deviation`` N: how unsure forces are for a detector,
+    as ``Reconstruction.apply`` says it of a log's.
     """
 
     forces: FrameForces
@@ -41,8 +40,12 @@ class StreamedForces:
     given: bool = False
     contradiction: float = float("nan")
     saturated: int = 0
-    contact: BoolArray | None = None
     force_deviation: float = 0.0
+
+    @property
+    def contact(self) -> BoolArray:
+        """The elements in contact, for a detector, [n, m]."""
+        return self.forces.contact
 
 
 class ForceStream:
@@ -113,9 +116,8 @@ class ForceStream:
         self._largest = max(self._largest, gripper_force or 0.0)
         at_end = self._range.step(moved_by, marked)
         found = self._found(time, moved_by, seen_along(marked, at_end), known)
-        contact, deviation = self._for_a_detector(found.forces, moved_by)
         count = int(np.count_nonzero(at_end.any(axis=-1)))
-        return replace(found, saturated=count, contact=contact, force_deviation=deviation)
+        return replace(found, saturated=count, force_deviation=self._force_deviation(found.forces))
 
     def close(self) -> None:
         """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
@@ -147,12 +149,11 @@ class ForceStream:
         forces = reader.read(frame.data, (n, m))
         return StreamedForces(forces, time - self._tracking.time, None, reader.given, self._compare(frame, forces))
 
-    def _for_a_detector(self, forces: FrameForces, moved_by: FloatArray) -> tuple[BoolArray | None, float]:
-        """What it is told of the contact, and of how unsure forces are, N."""
+    def _force_deviation(self, forces: FrameForces) -> float:
+        """How unsure forces are for a detector, N: all of them where markers do not show pressure."""
         if self._tracking is None or self._tracking.sensor.shows_pressure:
-            return forces.contact if 2 in self._axes else None, forces.force_noise
-        noise = np.inf if self._noise is None else self._noise
-        return taken_along(moved_by, noise), float(np.abs(forces.force).max())
+            return forces.ratio_noise
+        return float(np.abs(forces.force).max())
 
     def _checked(
         self, time: float, displacement: ArrayLike, observed: ArrayLike | None

@@ -20,14 +20,15 @@ from slipcore.forces.tracking.over_time import ContactRun, runs
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
 from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, FloatArray, GraspLog
-from slipcore.markers import contact_by_motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reconstruction:
     """Forces by the object, and how well they are known.
 
-    ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``alike``, those of which
+    ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``, and that of changes of the
+    normal force ``of_changes`` [t, n, m] N: in the plane without the error of discretisation, which lasts as long as
+    the contact; ``alike``, those of which
     tangential and normal parts are averaged alike, for their ratio; ``resultant`` [t, 3] N of the
     whole contact, also of what lies beyond the lattice, with ``resultant_deviation``, and its ``moment`` [t] N m about
     the sensor's z, through the origin of its places, with ``moment_deviation``; ``contact`` [t, n, m];
@@ -45,6 +46,7 @@ class Reconstruction:
 
     force: FloatArray
     deviation: FloatArray
+    of_changes: FloatArray
     alike: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
@@ -71,33 +73,32 @@ class Reconstruction:
     def apply(self, log: GraspLog) -> GraspLog:
         """The log with these forces, which its metadata call reconstructed, and how unsure they are for a detector.
 
-        Unless the log knows it, the contact is that which was found where depth is seen, else a detector finds it by
-        the forces. Where markers do not show pressure it is by their motion, and no force is sure.
+        Unless the log knows it, the contact is that which was found. Where markers do not show pressure no force is
+        sure.
         """
         if self.force.shape != log.displacement.shape:
             raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
-        deviation = self.force_noise if self.shows_pressure else float(np.abs(self.force).max())
+        deviation = self.ratio_noise if self.shows_pressure else float(np.abs(self.force).max())
         about = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
         contact = log.contact
         if contact is None or log.metadata.get("contact") in (BY_MOTION, BY_FORCES):
-            contact, about["contact"] = self._contact_of(log)
+            contact, about["contact"] = self.contact, BY_FORCES
         return replace(log, force=self.force, normal=normal, contact=contact, metadata={**log.metadata, **about})
 
     def for_samples(self, log: GraspLog) -> GraspLog:
         """The log that ``apply`` gave, as friction samples are to be collected from it: with forces averaged alike."""
         return replace(log, force=self.alike)
 
-    def _contact_of(self, log: GraspLog) -> tuple[BoolArray | None, str]:
-        """What a detector is told of it, and where it is from."""
-        if not self.shows_pressure:
-            return contact_by_motion(log.time, log.displacement), BY_MOTION
-        return self.contact if log.displacement[..., 2].any() else None, BY_FORCES
-
     @property
     def force_noise(self) -> float:
         """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
-        return typical_deviation(self.deviation, self.contact)
+        return typical_deviation(self.deviation[..., 2], self.contact)
+
+    @property
+    def ratio_noise(self) -> float:
+        """Typical standard deviation of changes of it, for an element's force ratio beside its own at other times."""
+        return typical_deviation(self.of_changes, self.contact)
 
     @property
     def of_samples(self) -> dict[str, float]:
@@ -208,6 +209,7 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, sensor:
     return Reconstruction(
         force=np.zeros(shape),
         deviation=np.zeros(shape),
+        of_changes=np.zeros(shape[:3]),
         alike=np.zeros(shape),
         resultant=np.zeros((len(log), 3)),
         resultant_deviation=np.zeros((len(log), 3)),

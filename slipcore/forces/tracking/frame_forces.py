@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import binary_fill_holes, maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.recording import OUTWARD
@@ -18,7 +18,8 @@ from slipcore.frames import BoolArray, FloatArray
 class FrameForces:
     """Forces by the object on one frame's elements, and how well they are known: as of a ``Reconstruction``.
 
-    ``force`` [n, m, 3] N, z outward, with its standard ``deviation``; ``alike`` [n, m, 3] N, the same averaged once
+    ``force`` [n, m, 3] N, z outward, with its standard ``deviation``, and that of changes of the normal force
+    ``of_changes`` [n, m] N; ``alike`` [n, m, 3] N, forces averaged once
     more so that tangential and normal parts are averaged alike; ``resultant`` [3] N, also of what lies beyond the
     lattice, with ``resultant_deviation``, and its ``moment`` N m about the sensor's z, with ``moment_deviation``;
     ``contact`` [n, m].
@@ -26,6 +27,7 @@ class FrameForces:
 
     force: FloatArray
     deviation: FloatArray
+    of_changes: FloatArray
     alike: FloatArray
     resultant: FloatArray
     resultant_deviation: FloatArray
@@ -36,7 +38,12 @@ class FrameForces:
     @property
     def force_noise(self) -> float:
         """As of a ``Reconstruction``, N."""
-        return typical_deviation(self.deviation, self.contact)
+        return typical_deviation(self.deviation[..., 2], self.contact)
+
+    @property
+    def ratio_noise(self) -> float:
+        """As of a ``Reconstruction``, N."""
+        return typical_deviation(self.of_changes, self.contact)
 
     @property
     def of_samples(self) -> dict[str, float]:
@@ -47,7 +54,7 @@ class FrameForces:
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
         """Of a frame of which nothing is known yet."""
         force, total = np.zeros((*grid, 3)), np.zeros(3)
-        return cls(force, force, force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
+        return cls(force, force, force[..., 2], force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
 
     @classmethod
     def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, moment: float, known: KnownForce) -> "FrameForces":
@@ -59,7 +66,8 @@ class FrameForces:
         left = np.where(known.given, np.sqrt(share) * known.deviation, limit)
         deviation = np.broadcast_to(limit, (*grid, 3))
         nothing = np.zeros((*grid, 3))
-        return cls(nothing, deviation, nothing, total, left, 0.0, moment, np.zeros(grid, dtype=bool))
+        untouched = np.zeros(grid, dtype=bool)
+        return cls(nothing, deviation, deviation[..., 2], nothing, total, left, 0.0, moment, untouched)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,18 +136,47 @@ class Reader:
         wrench = self._wrench(traction)
         force = ((self.elements @ traction.T) * OUTWARD).reshape(*grid, 3)
         largest = RECONSTRUCTION.element_error * np.abs(force).max()
-        by_noise = np.hypot(misfit * self.deviation[2].reshape(grid), largest)
-        covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * self.sensor.load
+        deviation = np.hypot(of_elements.T.reshape(force.shape), largest)
+        noise = (misfit * self.deviation).reshape(3, *grid)
         return FrameForces(
             force,
-            np.hypot(of_elements.T.reshape(force.shape), largest),
+            deviation,
+            deviation[..., 2] if self.sensor.sees_depth else np.hypot(noise[2], largest),
             (self._averaged_alike(traction) @ self.elements.T).T.reshape(force.shape) * OUTWARD,
             wrench[:3] * OUTWARD,
             of_wrench[:3],
             float(wrench[3]),
             float(of_wrench[3]),
-            _touching(-force[..., 2], by_noise) & covered,
+            self._contact(force, deviation, noise),
         )
+
+    def _contact(self, force: FloatArray, deviation: FloatArray, noise: FloatArray) -> BoolArray:
+        """Elements [n, m] in contact, by forces [n, m, 3] N with their ``deviation`` and ``noise`` [3, n, m] N: those
+        that are pressed, as far as markers show it. In the plane alone these mostly show shear better, which only what
+        touches bears: then those that bear it, and what is pressed between them.
+        """
+        pressed = self._pressed(-force[..., 2], noise[2], np.abs(force).max())
+        if self.sensor.sees_depth:
+            return pressed
+        shear = np.hypot(force[..., 0], force[..., 1])
+        left = RECONSTRUCTION.element_error * shear.max()
+        bearing = _touching(shear, np.hypot(noise[:2].max(axis=0), left))
+        either = pressed | bearing
+        if not either.any():
+            return either
+        unsure = np.median(deviation[either], axis=0)
+        if self.sensor.shows_pressure and unsure[:2].max() * -force[..., 2].min() > unsure[2] * shear.max():
+            return pressed
+        return np.asarray(bearing | (pressed & binary_fill_holes(bearing)))
+
+    def _pressed(self, normal: FloatArray, noise: FloatArray, largest: float) -> BoolArray:
+        """Elements with a ``normal`` force [n, m] N beyond ``noise`` N, beside a ``largest`` force N of any; none where
+        markers do not show pressure.
+        """
+        if not self.sensor.shows_pressure:
+            return np.zeros(normal.shape, dtype=bool)
+        covered = self.elements.sum(axis=1).reshape(normal.shape) > RECONSTRUCTION.covered * self.sensor.load
+        return np.asarray(_touching(normal, np.hypot(noise, RECONSTRUCTION.element_error * largest)) & covered)
 
     def _deviations(self, traction: FloatArray, known: FrameEstimate, misfit: float) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of elements' forces [3, e] N and of the wrench [4], N and N m: by the data, by what
@@ -184,8 +221,8 @@ def _wrench(by_each: FloatArray, traction: FloatArray) -> FloatArray:
 
 
 def typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:
-    """Median ``deviation`` [..., 3] N of normal forces on elements in ``contact`` [...], 0 without."""
-    touching = deviation[..., 2][contact]
+    """Median ``deviation`` [...] N of normal forces on elements in ``contact`` [...], 0 without."""
+    touching = deviation[contact]
     return float(np.median(touching)) if touching.size else 0.0
 
 
@@ -194,10 +231,10 @@ def sample_options(force_noise: float) -> dict[str, float]:
     return {"force_noise": force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
 
 
-def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:
-    """Elements [n, m] whose normal force is neither noise of this ``deviation`` nor little beside others': what may lie
-    between nodes says where in the contact a force acts, not whether there is one.
+def _touching(force: FloatArray, deviation: FloatArray) -> BoolArray:
+    """Elements [n, m] whose normal force or shear is neither noise of this ``deviation`` nor little beside others':
+    what may lie between nodes says where in the contact a force acts, not whether there is one.
     """
-    near = RECONSTRUCTION.rim_share * maximum_filter(normal, 3)
-    least = np.maximum(near, RECONSTRUCTION.element_share * normal.max())
-    return np.asarray(normal > np.maximum(RECONSTRUCTION.element_significance * deviation, least))
+    near = RECONSTRUCTION.rim_share * maximum_filter(force, 3)
+    least = np.maximum(near, RECONSTRUCTION.element_share * force.max())
+    return np.asarray(force > np.maximum(RECONSTRUCTION.element_significance * deviation, least))

@@ -17,7 +17,7 @@ FRAMES, SHAPE = 4, (4, 2, 3, 3)
 def found(**changes: object) -> Reconstruction:
     nothing = np.zeros(SHAPE)
     whole = Reconstruction(
-        force=nothing, deviation=nothing, alike=nothing, resultant=np.zeros((FRAMES, 3)),
+        force=nothing, deviation=nothing, of_changes=nothing[..., 2], alike=nothing, resultant=np.zeros((FRAMES, 3)),
         resultant_deviation=np.zeros((FRAMES, 3)), moment=np.zeros(FRAMES), moment_deviation=np.zeros(FRAMES),
         contact=np.ones(SHAPE[:3], bool), kernel_width=2.5e-3, information=np.array([1.0, 0.5, 0.256]), condition=1.0,
         noise=1e-6, given=np.zeros((FRAMES, 3), bool), contradiction=np.full((FRAMES, 3), np.nan),

@@ -142,3 +142,42 @@ def test_nothing_unnoticed_turns_by_more_than_the_largest_arm_of_what_is_unnotic
     sensor = SensorResponse.of(moved, PITCH**2, Gel(1e6, 0.49, 5e-3), (0, 1))
     along_x, along_y, _ = sensor.unnoticed(1e-6)
     assert sensor.unnoticed_moment(1e-6) == pytest.approx(np.hypot(5e-3 * along_x, 6e-3 * along_y))
+
+
+@pytest.mark.parametrize(
+    ("axes", "thickness", "touches"), [((0, 1), 5e-3, True), ((0, 1), np.inf, True), ((0, 1, 2), 5e-3, False)]
+)
+def test_in_the_plane_what_bears_shear_touches_whatever_its_pressure(
+    axes: tuple[int, ...], thickness: float, touches: bool
+) -> None:
+    """Shear alone, on a disk; with depth seen, pressure is known that well itself."""
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49, thickness), axes)
+    observation = sensor.observation(np.full(len(sensor.response), 1e-6), KnownForce.of(None, None, 1)[0])
+    disk = np.hypot(*sensor.nodes.places().T) < 2.6e-3
+    data = observation.response[:, 0, disk].sum(axis=1) * 0.02
+    key = Key(observation, data, fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.02)))
+    found = Reader.of(sensor, key).read(data, (9, 9))
+    distance = np.hypot(POSITION[..., 0], POSITION[..., 1])
+    assert found.contact[distance < 2.1e-3].all() == touches
+    assert not found.contact[distance > 3.7e-3].any()
+    assert found.contact.any() == touches
+
+
+@pytest.mark.parametrize(("of_shear", "of_pressure", "beside"), [(0.01, 0.5, False), (0.1, 0.01, True)])
+def test_the_contact_in_the_plane_is_by_what_is_surer_of_shear_and_pressure(
+    of_shear: float, of_pressure: float, beside: bool
+) -> None:
+    """Nine elements are pressed, the middle one of which bears no shear, as where an object turns; and one aside."""
+    sensor = SensorResponse.of(POSITION, PITCH**2, Gel(1e6, 0.49, 5e-3), (0, 1))
+    observation = sensor.observation(np.full(len(sensor.response), 1e-6), KnownForce.of(None, None, 1)[0])
+    disk = np.hypot(*sensor.nodes.places().T) < 3.7e-3
+    key = Key(observation, np.zeros(165), fit(observation, sensor.nodes, disk, TractionPrior(usual(), 0.02)))
+    force, expected = np.zeros((9, 9, 3)), np.zeros((9, 9), dtype=bool)
+    force[3:6, 3:6] = [0.1, 0.0, -1.0]
+    force[4, 4, 0] = 0.0
+    force[4, 7, 2] = -1.0
+    expected[3:6, 3:6] = True
+    expected[4, 7] = beside
+    deviation = np.broadcast_to([of_shear, of_shear, of_pressure], force.shape)
+    nothing = np.zeros((3, 9, 9))
+    np.testing.assert_array_equal(Reader.of(sensor, key)._contact(force, deviation, nothing), expected)
