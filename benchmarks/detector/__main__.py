@@ -1,10 +1,11 @@
 """What the slip detector costs and how well it finds slip: `python -m benchmarks.detector [--output FOLDER]`.
 
-Every method streams 250 frames of 20×20 markers through `SlipDetector.step`, frame by frame as a live sensor would,
-and takes them as one batch through `detect_slip`. The log is a simulated ramp with noise, and each real Tac3D recording
-that is found. Then every method is scored on scenes with truth (benchmarks/detector/accuracy.py). Prints tables and
-writes detector.json, detector.png, detector_accuracy.json, detector_accuracy.png, detector_reliability.json and .png
-(is a reported probability the share that slips?) and detector_conditions.json (benchmarks/detector/conditions.py).
+Every method streams logs of 20×20 markers through `SlipDetector.step`, frame by frame as a live sensor would,
+and takes them as one batch through `detect_slip`. Logs are a simulated ramp with noise, one whose contact covers the
+sensor, with forces and from displacement alone, and each real Tac3D recording that is found. Then every method is
+scored on scenes with truth (benchmarks/detector/accuracy.py). Prints tables and writes detector.json, detector.png,
+detector_accuracy.json, detector_accuracy.png, detector_reliability.json and .png (is a reported probability the share
+that slips?) and detector_conditions.json (benchmarks/detector/conditions.py).
 `--only accuracy --page docs/detector.md` renews the tables of scores there.
 """
 
@@ -23,6 +24,7 @@ from benchmarks.detector import accuracy as detector_accuracy
 from benchmarks.detector import conditions as detector_conditions
 from benchmarks.detector.scenes import cases, observed
 from service.formats import tac3d
+from service.slip_benchmark.running import NEEDS_FORCES
 from slipcore import METHODS, GraspLog, SlipDetector, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 
@@ -47,11 +49,16 @@ class Cost:
 
 
 def logs(recordings: Path) -> Iterator[tuple[str, GraspLog]]:
-    """The simulated ramp, and the real recordings that are there; normals are left to the detector."""
+    """The simulated ramps, and the real recordings that are there; normals are left to the detector."""
     schedule = RampSchedule(rest=0.5, press=1.0, settle=0.5, shear=5.3, hold=1.0)
     ramp = tangential_ramp(schedule=schedule, marker_noise=1e-6, force_noise=2e-3)
     assert len(ramp) == FRAMES
     yield "simulated ramp", replace(ramp, normal=None, object_pose=None)
+    schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.3)
+    covered = tangential_ramp(schedule=schedule, pitch=0.2e-3, marker_noise=1e-6, force_noise=2e-4)
+    covered = replace(covered, normal=None, object_pose=None)
+    yield "all elements touch", covered
+    yield "all elements touch, displacement alone", replace(covered, force=None)
     for path in sorted(recordings.glob("*/*/3D_Positions.npy")):
         yield path.parent.name, tac3d.read(path.parent)
 
@@ -155,7 +162,10 @@ def report_accuracy(arguments: argparse.Namespace) -> None:
 def report_costs(arguments: argparse.Namespace) -> None:
     """Time all methods."""
     costs = [
-        measure(name, log, method, arguments.repeats) for name, log in logs(arguments.recordings) for method in METHODS
+        measure(name, log, method, arguments.repeats)
+        for name, log in logs(arguments.recordings)
+        for method in METHODS
+        if log.force is not None or method not in NEEDS_FORCES
     ]
     print("| log | method | frames | step median, µs | p99, µs | batch, ms | slipping | noise, µm |")
     print("|---|---|---|---|---|---|---|---|")
