@@ -173,9 +173,12 @@ def with_friction(outcome: Outcome, friction: float) -> Moments:
     own, factor = Moments.from_bytes(base64.b64decode(outcome.moments)), np.array([1.0, 1.0, friction / outcome.truth])
     whole = replace(own.factor, mean=own.factor.mean * factor, triangle=own.factor.triangle * factor)
     grasps = [
-        replace(each, mean=each.mean * factor, spread=each.spread * factor, within=each.within * factor)
+        replace(
+            each, mean=each.mean * factor, spread=each.spread * factor, within=each.within * factor,
+            alone=None if each.alone is None else each.alone * factor,
+        )
         for each in own.grasps
-    ]
+    ]  # fmt: skip
     return replace(own, factor=whole, grasps=tuple(grasps))
 
 
