@@ -199,3 +199,12 @@ def test_bodies_apart_bear_no_load_and_nothing_has_moved() -> None:
     state = QuasiStatic(sphere_on(0.3), Grid.square(8, 11e-3)).start()
     assert (state.load.normal_force, state.load.approach) == (0.0, None)
     assert not any(np.any(field) for field in (state.load.tangential, state.load.motion, state.stress.pressure))
+
+
+def test_only_a_body_that_touches_and_bears_no_more_slides() -> None:
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(16, 11e-3))
+    state, pressed = solver.step(solver.start(), shear(FORCE, 0.0))
+    pulled = StepLoad(FORCE, motion=np.array([1e-2, 0.0, 0.0]), given=(False, False, False), duration=1.0)
+    _, moved = solver.step(state, pulled)
+    _, lifted = solver.step(state, shear(0.0, 0.0))
+    assert (pressed.sliding, moved.sliding, lifted.sliding) == (False, True, False)
