@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import estimators
 import slipcore
@@ -23,6 +23,17 @@ _LOOKS = FairExecutor()
 """Does the looks for friction, so that frames need not wait for them."""
 
 
+class RecentFrames(NamedTuple):
+    """The last frames and the detector's answers to them, its state, and ``options`` of samples of reconstructed
+    forces.
+    """
+
+    frames: list[Frame]
+    answers: list[SlipState]
+    state: "DetectorState"
+    options: Mapping[str, float]
+
+
 def plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None:
     """Once in a while, let the last frames be looked at."""
     if frame.force is None:
@@ -35,33 +46,22 @@ def plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None:
     if session.until_look == 0:
         session.until_look = STRIDE
         options = {} if session.forces is None or session.forces.stream is None else session.forces.of_samples
-        given = session.frames, session.answers, session.detector.state, options
-        session.look = _LOOKS.of(session.limit.owner).submit(_look, session, *given)
+        recent = RecentFrames(session.frames, session.answers, session.detector.state, options)
+        session.look = _LOOKS.of(session.limit.owner).submit(_look, session, recent)
 
 
-def _look(
-    session: DetectorSession,
-    frames: list[Frame],
-    answers: list[SlipState],
-    state: "DetectorState",
-    options: Mapping[str, float],
-) -> None:
+def _look(session: DetectorSession, recent: RecentFrames) -> None:
     try:
-        _find_friction(session, frames, answers, state, options)
+        _find_friction(session, recent)
     except Exception:  # costs the stream this second's friction, and nothing else
         logger.exception("a look for friction failed")
 
 
-def _find_friction(
-    session: DetectorSession,
-    frames: list[Frame],
-    answers: list[SlipState],
-    state: "DetectorState",
-    options: Mapping[str, float],
-) -> None:
-    """The samples since the last look, merged with those before; ``options`` of samples of reconstructed forces."""
-    samples = collect_samples(log_of(session, frames, "", {}), slipcore.collect_history(answers, state), **options)
-    end = frames[-1].time  # which has no next frame yet, so it is the next look's
+def _find_friction(session: DetectorSession, recent: RecentFrames) -> None:
+    """The samples since the last look, merged with those before."""
+    history = slipcore.collect_history(recent.answers, recent.state)
+    samples = collect_samples(log_of(session, recent.frames, "", {}), history, **recent.options)
+    end = recent.frames[-1].time  # which has no next frame yet, so it is the next look's
     new = (samples.time >= session.looked_until) & (samples.time < end)
     session.looked_until = end
     part = {name: getattr(samples, name)[new] for name in samples.arrays()}
