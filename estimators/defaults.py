@@ -351,7 +351,7 @@ class ClusterSettings(Options):
     by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual for what differs from chance")] = 2.0
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
     independent: Annotated[float, Option(0.01, 0.99, "-", "as likely as not")] = 0.5
-    """Probability, before a record of one place is seen, that none of its errors last."""
+    """Probability, before the levels of a grasp's places are seen, that none of their errors last."""
     lasting_freedom: Annotated[float, Option(0.5, 100.0, "-", "tuning seeds of 2 to 10 places: 95 % are held")] = 3.0
     """Degrees of freedom with which the levels of places tell how errors last."""
     few_places: Annotated[float, Option(0.0, 1.0, "-", "ten places whose errors last: 0.87")] = 0.9

@@ -14,7 +14,7 @@ from slipcore.forces.inverse.whole_lattice import WholeLattice
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.reconstruction.height import at_points
 from slipcore.forces.recording import DisplacementData, error, rows
-from slipcore.forces.tracking.frame_forces import FrameForces, Reader, sample_options, typical_deviation
+from slipcore.forces.tracking.frame_forces import FrameForces, Reader, TypicalDeviations
 from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.over_time import ContactRun, runs
 from slipcore.forces.tracking.sensor import SensorResponse
@@ -23,7 +23,7 @@ from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, Floa
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reconstruction:
+class Reconstruction(TypicalDeviations):
     """Forces by the object, and how well they are known.
 
     ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``, and that of changes of the
@@ -89,21 +89,6 @@ class Reconstruction:
     def for_samples(self, log: GraspLog) -> GraspLog:
         """The log that ``apply`` gave, as friction samples are to be collected from it: with forces averaged alike."""
         return replace(log, force=self.alike)
-
-    @property
-    def force_noise(self) -> float:
-        """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
-        return typical_deviation(self.deviation[..., 2], self.contact)
-
-    @property
-    def ratio_noise(self) -> float:
-        """Typical standard deviation of changes of it, for an element's force ratio beside its own at other times."""
-        return typical_deviation(self.of_changes, self.contact)
-
-    @property
-    def of_samples(self) -> dict[str, float]:
-        """Options of friction samples by these forces."""
-        return sample_options(self.force_noise)
 
 
 def reconstruct(

@@ -14,8 +14,32 @@ from slipcore.forces.tracking.unresolved import Unresolved
 from slipcore.frames import BoolArray, FloatArray
 
 
+class TypicalDeviations:
+    """How unsure forces are as a whole, of one frame's or a log's."""
+
+    __slots__ = ()
+    deviation: FloatArray
+    of_changes: FloatArray
+    contact: BoolArray
+
+    @property
+    def force_noise(self) -> float:
+        """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
+        return _typical_deviation(self.deviation[..., 2], self.contact)
+
+    @property
+    def ratio_noise(self) -> float:
+        """Typical standard deviation of changes of it, for an element's force ratio beside its own at other times."""
+        return _typical_deviation(self.of_changes, self.contact)
+
+    @property
+    def of_samples(self) -> dict[str, float]:
+        """Options of friction samples by these forces."""
+        return {"force_noise": self.force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class FrameForces:
+class FrameForces(TypicalDeviations):
     """Forces by the object on one frame's elements, and how well they are known: as of a ``Reconstruction``.
 
     ``force`` [n, m, 3] N, z outward, with its standard ``deviation``, and that of changes of the normal force
@@ -34,21 +58,6 @@ class FrameForces:
     moment: float
     moment_deviation: float
     contact: BoolArray
-
-    @property
-    def force_noise(self) -> float:
-        """As of a ``Reconstruction``, N."""
-        return typical_deviation(self.deviation[..., 2], self.contact)
-
-    @property
-    def ratio_noise(self) -> float:
-        """As of a ``Reconstruction``, N."""
-        return typical_deviation(self.of_changes, self.contact)
-
-    @property
-    def of_samples(self) -> dict[str, float]:
-        """As of a ``Reconstruction``."""
-        return sample_options(self.force_noise)
 
     @classmethod
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
@@ -220,15 +229,10 @@ def _wrench(by_each: FloatArray, traction: FloatArray) -> FloatArray:
     return np.asarray(by_each.reshape(4, -1) @ traction.ravel())
 
 
-def typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:
+def _typical_deviation(deviation: FloatArray, contact: BoolArray) -> float:
     """Median ``deviation`` [...] N of normal forces on elements in ``contact`` [...], 0 without."""
     touching = deviation[contact]
     return float(np.median(touching)) if touching.size else 0.0
-
-
-def sample_options(force_noise: float) -> dict[str, float]:
-    """Options of friction samples by forces with this noise N of an element's normal force."""
-    return {"force_noise": force_noise, "force_to_noise": RECONSTRUCTION.force_to_noise}
 
 
 def _touching(force: FloatArray, deviation: FloatArray) -> BoolArray:
