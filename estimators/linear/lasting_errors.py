@@ -53,9 +53,9 @@ def errors_of_levels(level: FloatArray, design: FloatArray, weight: FloatArray) 
     log_weight[0] += np.log(CLUSTERS.independent / (1.0 - CLUSTERS.independent) * (len(LASTS) - 1))
     likely = np.exp(log_weight - log_weight.max())
     variance = likely / likely.sum() * square / (degrees - 2)
-    apart = np.abs(np.subtract.outer(np.arange(level.shape[1]), np.arange(level.shape[1])))
-    lasting = np.tensordot(variance * (1.0 - OWN), np.exp(-apart / LASTS[:, None, None]), 1)
-    return LevelErrors(variance @ OWN * own, np.asarray(lasting))
+    later = np.arange(level.shape[1])
+    lasting = (variance * (1.0 - OWN)) @ np.exp(-later / LASTS[:, None])
+    return LevelErrors(variance @ OWN * own, np.asarray(lasting[np.abs(np.subtract.outer(later, later))]))
 
 
 def _left(products: FloatArray) -> tuple[FloatArray, FloatArray]:
