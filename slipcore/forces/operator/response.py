@@ -5,8 +5,9 @@ from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d, map_coordinates, spline_filter
+from scipy.ndimage import map_coordinates, spline_filter
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
@@ -74,10 +75,10 @@ def _of_a_layer(
 @lru_cache(maxsize=2)  # logs of one sensor ask for the same, and 1 to 7 MB
 def _splines(gel: Gel, pitch: float, cells: int, finer: int, close: int, reach: int) -> Mapping[Below, FloatArray]:
     """``hat_responses`` at offsets of up to ``reach`` cells, by ``finer`` ones up to ``close``, as cubic splines."""
-    far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
+    far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer, finer)
     middle = (slice(reach - close, reach + close + 1),) * 2
     for component, table in far.items():
-        table[middle] = near[component][::finer, ::finer]
+        table[middle] = near[component]
         far[component] = spline_filter(table, order=3, mode="mirror")
         far[component].flags.writeable = False
     return MappingProxyType(far)
@@ -93,18 +94,22 @@ def _offsets(position: FloatArray, places: FloatArray, cell: float) -> tuple[Flo
     return apart[first], which.reshape(len(position), len(places))
 
 
-def hat_responses(gel: Gel, pitch: float, cells: int, reach: int) -> dict[Below, FloatArray]:
+def hat_responses(gel: Gel, pitch: float, cells: int, reach: int, step: int = 1) -> dict[Below, FloatArray]:
     """Displacements (m) by 1 Pa on a hat function of half-width ``pitch``, made of so many cells a pitch.
 
-    At offsets of up to ``reach`` cells along y and x from its centre, each [2 reach + 1, 2 reach + 1].
+    At offsets of up to ``reach`` cells along y and x from its centre, from one end in steps of so many cells: each
+    [n, n], n = 2 reach / step + 1.
     """
     side = reach + cells + 1
     kernels = cell_responses(gel, Grid((side, side), (pitch / cells, pitch / cells)))
-    return {component: _by_hats(_mirrored(kernel, component), cells) for component, kernel in kernels.items()}
+    return {component: _by_hats(_mirrored(kernel, component), cells, step) for component, kernel in kernels.items()}
 
 
 def cell_responses(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
-    """Displacements (m) by 1 Pa on one cell at the first quadrant's offsets, by the contact simulator's kernels."""
+    """Displacements (m) by 1 Pa on one cell at the first quadrant's offsets, by the contact simulator's kernels.
+
+    Of a square of square cells, on which y is x turned.
+    """
     if gel.marker_depth > 0.0:
         return Interior(gel.young_modulus, gel.poisson_ratio, gel.thickness, gel.marker_depth).influences(grid)
     bodies: list[ElasticBody] = [HalfSpace.from_young(gel.young_modulus, gel.poisson_ratio)]
@@ -112,9 +117,10 @@ def cell_responses(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
         bodies.append(LayerBase(gel.thickness, gel.young_modulus, gel.poisson_ratio))
     operator = ElasticOperator(tuple(bodies), grid)
     surface: dict[Below, FloatArray] = {}
-    for component in ("nn", "xx", "xy", "yy", "zx", "zy"):
+    for component in ("nn", "xx", "xy", "zx"):
         kernel = operator.influence(component)
         surface[component] = np.zeros(grid.shape) if kernel is None else kernel
+    surface |= {"yy": surface["xx"].T, "zy": surface["zx"].T}
     return surface | {"xz": -surface["zx"], "yz": -surface["zy"]}
 
 
@@ -131,11 +137,14 @@ def _mirrored(quadrant: FloatArray, component: Below) -> FloatArray:
     return np.concatenate((half[:0:-1] * (-1.0 if component in ODD_Y else 1.0), half))
 
 
-def _by_hats(kernel: FloatArray, cells: int) -> FloatArray:
-    """Response to a hat function of ``cells`` cells half-width, from that to one cell; without the cells it reaches."""
+def _by_hats(kernel: FloatArray, cells: int, step: int) -> FloatArray:
+    """Response to a hat function of ``cells`` cells half-width, from that to one cell, in steps of so many cells;
+    without the cells it reaches.
+    """
     weight = 1.0 - np.abs(np.arange(-cells, cells + 1)) / cells
     weight[cells] -= 0.25 / cells  # means of the hat over the cell in its middle
     weight[[0, -1]] = 1.0 / (8.0 * cells)  # and over those at its foot
-    for axis in (0, 1):
-        kernel = convolve1d(kernel, weight, axis=axis)
-    return np.ascontiguousarray(kernel[cells:-cells, cells:-cells])
+    for _ in range(2):
+        kernel = sliding_window_view(kernel, len(weight), axis=0)[::step] @ weight
+        kernel = kernel.T
+    return np.ascontiguousarray(kernel)

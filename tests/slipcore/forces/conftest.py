@@ -1,15 +1,27 @@
 """A scene of an independent solver, seen by a sensor that measures no forces."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from slipcore import GraspLog
+from slipcore.forces.operator import response
 
 SCENES = Path(__file__).parents[2] / "data" / "contact"
 Pressed = Callable[..., GraspLog]
+GELS = 16
+"""Whose tables are kept, of up to 7 MB each; a service keeps two."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def gels_tabulated_once() -> Iterator[None]:
+    """Tests of many gels and lattices by turns would tabulate each several times."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(response, "_splines", lru_cache(maxsize=GELS)(response._splines.__wrapped__))
+        yield
 
 
 @pytest.fixture(scope="session")

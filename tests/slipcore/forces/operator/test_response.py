@@ -7,6 +7,10 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from slipcore import InvalidInput
+from slipcore.contact.elasticity.bonded_layer import LayerBase
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.forces.defaults import NODES as OF_NODES
 from slipcore.forces.operator import response
 from slipcore.forces.operator.gel import Gel
@@ -158,3 +162,15 @@ def test_logs_of_one_sensor_tabulate_its_gel_once_and_another_gel_anew(monkeypat
     np.testing.assert_allclose(of_hard, 0.5 * first, rtol=1e-9, atol=1e-20)
     moved = response_matrix(soft, NODES, MARKERS + 0.3 * PITCH)
     assert np.abs(moved - first).max() > 0.01 * np.abs(first).max()
+
+
+def test_a_table_in_steps_holds_every_so_manieth_offset_and_y_is_x_turned() -> None:
+    gel = Gel(1e6, 0.45, 3e-3)
+    whole, steps = (response.hat_responses(gel, PITCH, 6, 12, step) for step in (1, 3))
+    for component, table in whole.items():
+        np.testing.assert_allclose(steps[component], table[::3, ::3], rtol=1e-12, atol=1e-24)
+    bodies = (HalfSpace.from_young(1e6, 0.45), LayerBase(3e-3, 1e6, 0.45))
+    operator = ElasticOperator(bodies, Grid((9, 9), (PITCH, PITCH)))
+    found = response.cell_responses(gel, operator.grid)
+    for component in ("yy", "zy"):
+        np.testing.assert_allclose(found[component], operator.influence(component), rtol=1e-9, atol=1e-20)
