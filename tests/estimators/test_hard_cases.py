@@ -21,9 +21,9 @@ METHODS: dict[str, dict[str, object]] = {
     "robust": {"method": "robust"},
     "conjugate": {"method": "conjugate"},
     "on a grid": {"method": "hierarchical"},
-    "auto": {"method": "auto", "accuracy": 0.2, "seconds": 0.2},
+    "auto": {"method": "auto", "accuracy": 0.2, "seconds": 0.05},
     **{
-        name: {"method": "bayes", "likelihood": name, "accuracy": 0.2, "seconds": 0.2}
+        name: {"method": "bayes", "likelihood": name, "accuracy": 0.2, "seconds": 0.05}
         for name in ("gaussian", "hierarchical", "student_t", "outlier", "errors_in_variables")
     },
 }

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from service.cli import main
 from service.cli.output import print_table
-from service.demo import run, server, tables
+from service.demo import inputs, run, server, tables
 from service.demo.inputs import FRICTION
 from service.report.page import Table
 from stiction_client import NoFeasibleForce, required_normal_force
@@ -106,13 +107,25 @@ def test_demo_without_recordings_says_so_and_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the real Tac3D recordings could not be fetched")
-def test_demo_takes_the_real_recordings_all_the_way(tmp_path: Path) -> None:
-    printed = demo(tmp_path / "out", "--recordings", str(RECORDINGS))
+@pytest.mark.parametrize("is_whole", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_demo_takes_the_real_recordings_all_the_way(
+    tmp_path: Path, is_whole: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Beside two grasps of one simulated material; as a command beside all of them, as ``make demo`` does."""
+    if is_whole:
+        printed = demo(tmp_path / "out", "--recordings", str(RECORDINGS))
+    else:
+        monkeypatch.setattr(inputs, "FRICTION", {"cardboard": 0.45})
+        monkeypatch.setattr(inputs, "NORMAL_FORCES", (4.0, 13.0))
+        with pytest.raises(SystemExit, match="0"):
+            main(["demo", "--output", str(tmp_path / "out"), "--recordings", str(RECORDINGS)])
+        printed = capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "left out" not in printed
-    for name in ("example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022"):
+    for name in ("example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022", "cardboard"):
         assert name in page
     assert "failed" not in page[page.index("<main>") :]
     tables = [line for line in printed.splitlines() if not line.startswith("Report: ")]
     assert max(map(len, tables)) <= 100
+    assert page.count("<svg") == (14 if is_whole else 8)
     assert {each.name for each in (tmp_path / "out").iterdir()} == {"logs", "report.html", "service"}

@@ -71,9 +71,12 @@ def test_log_half_student_is_the_t_density() -> None:
         np.testing.assert_allclose(found - found[0], wanted - wanted[0], rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("fits", [12, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.parametrize("count", [3, 12])
-def test_intervals_cover_where_grasps_differ_and_iid_ones_do_not(samples: Make, truth: np.ndarray, count: int) -> None:
-    fits, level = 30, 0.9
+def test_intervals_cover_where_grasps_differ_and_iid_ones_do_not(
+    samples: Make, truth: np.ndarray, count: int, fits: int
+) -> None:
+    level = 0.9
     inside, naive, predicted = np.zeros(3), np.zeros(3), 0
     for seed in range(fits):
         data = grasps(samples, count + 1, seed=seed)

@@ -177,9 +177,10 @@ def test_intervals_shrink_as_grasps_come_and_one_grasp_answers() -> None:
     assert (np.diff(widths) < 0.0).all()
 
 
+@pytest.mark.parametrize("fits", [24, pytest.param(60, marks=pytest.mark.long)])
 @pytest.mark.parametrize("scatter", [(0.06, 0.0, 0.03), (0.0, 0.03, 0.005), (0.0, 0.0, 0.03), (0.06, 0.03, 0.03)])
-def test_intervals_cover_whatever_scatters(scatter: tuple[float, float, float]) -> None:
-    fits, inside = 60, np.zeros(3)
+def test_intervals_cover_whatever_scatters(scatter: tuple[float, float, float], fits: int) -> None:
+    inside = np.zeros(3)
     for seed in range(fits):
         low, high = (
             estimators.fit([grasp(1000 * seed + k, *scatter) for k in range(4)], method="hierarchical").interval().T

@@ -120,11 +120,12 @@ def test_disagreement_with_least_squares_is_told(samples: Make) -> None:
     assert compared(model, data).endswith("agrees")
 
 
+@pytest.mark.parametrize("fits", [8, pytest.param(20, marks=pytest.mark.long)])
 @pytest.mark.parametrize("spoil", [clean, correlated, heteroscedastic, outliers])
 def test_intervals_cover_whatever_the_fault(
-    samples: Make, truth: np.ndarray, spoil: Callable[..., FrictionSamples]
+    samples: Make, truth: np.ndarray, spoil: Callable[..., FrictionSamples], fits: int
 ) -> None:
-    fits, inside = 20, np.zeros(3)
+    inside = np.zeros(3)
     for seed in range(fits):
         low, high = estimators.fit(spoil(samples, seed), method="auto").interval(0.95).T
         inside += (low <= truth) & (truth <= high)

@@ -88,8 +88,11 @@ def test_degrees_of_freedom_fall_where_one_cluster_tells_most(samples: Make) -> 
     assert uneven.degrees_of_freedom < 3.0
 
 
-def test_intervals_cover_the_truth_and_predictions_a_new_observation(samples: Make, truth: np.ndarray) -> None:
-    fits, level = 400, 0.9
+@pytest.mark.parametrize("fits", [150, pytest.param(400, marks=pytest.mark.long)])
+def test_intervals_cover_the_truth_and_predictions_a_new_observation(
+    samples: Make, truth: np.ndarray, fits: int
+) -> None:
+    level = 0.9
     inside, predicted = np.zeros(3), 0
     for seed in range(fits):
         model = estimators.fit(samples(200, seed=seed, elements=40))
@@ -105,9 +108,12 @@ def test_intervals_cover_the_truth_and_predictions_a_new_observation(samples: Ma
         assert expected.ppf(1e-3) <= count <= expected.ppf(1.0 - 1e-3)
 
 
+@pytest.mark.parametrize("fits", [80, pytest.param(200, marks=pytest.mark.long)])
 @pytest.mark.parametrize("grasps", [2, 3, 5, 12])
-def test_intervals_do_not_undercover_where_grasps_differ(samples: Make, truth: np.ndarray, grasps: int) -> None:
-    fits, inside, classical = 200, np.zeros(3), np.zeros(3)
+def test_intervals_do_not_undercover_where_grasps_differ(
+    samples: Make, truth: np.ndarray, grasps: int, fits: int
+) -> None:
+    inside, classical = np.zeros(3), np.zeros(3)
     rng = np.random.default_rng([grasps, 1])
     for seed in range(fits):
         parts = [samples(30, seed=seed * 100 + g, offset=0.03 * rng.standard_normal()) for g in range(grasps)]
@@ -116,7 +122,7 @@ def test_intervals_do_not_undercover_where_grasps_differ(samples: Make, truth: n
         inside += (low <= truth) & (truth <= high)
         classical += np.abs(model.coefficients - truth) < 1.65 * standard_errors(model, "classical")
     assert (inside >= stats.binom(fits, 0.9).ppf(1e-3)).all()
-    assert grasps < 5 or classical[0] < inside[0] - 30  # what independent errors would have claimed
+    assert grasps < 5 or classical[0] < inside[0] - 0.15 * fits  # what independent errors would have claimed
 
 
 def test_prediction_quantile_includes_scatter_and_uncertainty(samples: Make) -> None:

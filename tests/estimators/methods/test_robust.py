@@ -47,19 +47,23 @@ def off(model: estimators.FrictionModel) -> np.ndarray:
     return np.asarray(model.predict([0.0, 5e-3], [0.05, 0.05]) - (0.36 + 2.0 * np.array([0.0, 5e-3])))
 
 
-def test_on_clean_data_it_costs_a_twentieth_in_variance(samples: Make) -> None:
+@pytest.mark.parametrize("fits", [100, pytest.param(300, marks=pytest.mark.long)])
+def test_on_clean_data_it_costs_a_twentieth_in_variance(samples: Make, fits: int) -> None:
     deviations = np.array(
         [
             [estimators.fit(samples(100, seed=seed), method=method).predict(2e-3, 0.05) for method in ("ols", "robust")]
-            for seed in range(300)
+            for seed in range(fits)
         ]
     )
     efficiency = deviations[:, 0].var() / deviations[:, 1].var()
     assert 0.85 < efficiency < 1.02  # 95 % asymptotically; 300 fits tell it to a few percent, as both see the same data
 
 
-def test_intervals_cover_with_a_tenth_of_outliers_and_plain_ones_do_not(samples: Make, truth: np.ndarray) -> None:
-    fits, inside, plain = 150, np.zeros(3), np.zeros(3)
+@pytest.mark.parametrize("fits", [60, pytest.param(150, marks=pytest.mark.long)])
+def test_intervals_cover_with_a_tenth_of_outliers_and_plain_ones_do_not(
+    samples: Make, truth: np.ndarray, fits: int
+) -> None:
+    inside, plain = np.zeros(3), np.zeros(3)
     for seed in range(fits):
         data = spoiled(samples, 0.1, seed=seed)
         for method, count in (("robust", inside), ("ols", plain)):
