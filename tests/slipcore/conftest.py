@@ -11,6 +11,7 @@ from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.surface.strain import Lattice
 
 RECORDINGS = Path(".cache/tac3d/PyTac3D/example_data")
+RECORDED = ("example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022")
 REFERENCE_SCENES = Path("../shared/data/contact")
 PITCH = 1e-3
 
@@ -68,7 +69,7 @@ def read_recording(folder: Path) -> GraspLog:
     )
 
 
-@pytest.fixture(params=["example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022"])
+@pytest.fixture(params=RECORDED)
 def recording(request: pytest.FixtureRequest) -> GraspLog:
     return read_recording(RECORDINGS / request.param)
 

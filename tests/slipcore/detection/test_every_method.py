@@ -25,6 +25,7 @@ from slipcore.detection.detector import init, step
 from slipcore.detection.shared.interface import Decision, Method, ObservedFrame
 from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.surface.strain import Lattice
+from tests.slipcore.conftest import RECORDED
 
 Same = Callable[[SlipHistory, SlipHistory], None]
 
@@ -106,10 +107,19 @@ def test_a_stream_that_goes_on_elsewhere_needs_no_kernel_of_its_own(short_ramp: 
     assert run.signatures == known
 
 
-@EACH_METHOD
+@pytest.mark.parametrize(
+    ("method", "recording"),
+    [
+        pytest.param(method, name, marks=[] if number % 3 == other else pytest.mark.long)
+        for number, method in enumerate(METHODS)
+        for other, name in enumerate(RECORDED)
+    ],
+    indirect=["recording"],
+)
 def test_streaming_equals_batch_on_real_recordings_cut_at_every_frame(
     recording: GraspLog, method: str, same_history: Same
 ) -> None:
+    """Each method on one of them, and in long tests on all."""
     check_streaming_is_batch(recording, method, same_history)
 
 
