@@ -8,6 +8,7 @@ which is exact to rounding and loses nothing.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
@@ -147,6 +148,7 @@ INTEGRANDS: dict[str, tuple[Function, Function]] = {
 """1/ρ, x²/ρ³, y²/ρ³, xy/ρ³, x/ρ² and y/ρ², each with its antiderivative."""
 
 
+@lru_cache(maxsize=16)  # bodies of any stiffness on one grid ask for the same
 def cell_integral(name: str, grid: Grid) -> FloatArray:
     """∫∫ of one of ``INTEGRANDS`` over a cell, seen at the offsets (i·hy, j·hx), i < ny, j < nx; [ny, nx] m."""
     integrand, antiderivative = INTEGRANDS[name]
@@ -155,10 +157,9 @@ def cell_integral(name: str, grid: Grid) -> FloatArray:
     reach = INFLUENCE.near * max(hx, hy)
     near = np.s_[: int(reach / hy) + 1, : int(reach / hx) + 1]
     corners = _by_corners(antiderivative, x[near], y[near], hx, hy)
-    if corners.shape == x.shape:
-        return corners
-    integral = _by_quadrature(integrand, x, y, hx, hy)
+    integral = corners if corners.shape == x.shape else _by_quadrature(integrand, x, y, hx, hy)
     integral[near] = corners
+    integral.flags.writeable = False
     return integral
 
 

@@ -1,6 +1,7 @@
 """A grasp log in closed form: a sphere is pressed on the sensor, then sheared (Hertz, Cattaneo–Mindlin)."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -65,14 +66,17 @@ def tangential_ramp(
     time, normal, tangential = _loads(schedule or RampSchedule(), ramp.frame_rate)
     position = _lattice(ramp.points, ramp.pitch)
 
-    def frame(k: int) -> _Fields:
-        hertz = HertzContact(ramp.sphere_radius, float(normal[k]) * ramp.normal_force, compliance)
+    @cache  # before the touch, while it settles and in the end the load stays as it is
+    def frame(pressed: float, sheared: float) -> _Fields:
+        hertz = HertzContact(ramp.sphere_radius, pressed * ramp.normal_force, compliance)
         sliding_force = ramp.friction * hertz.normal_force
-        sheared = CattaneoMindlin(hertz, ramp.friction, float(tangential[k]) * ramp.tangential_force * sliding_force)
-        return _fields(sheared, position, ramp.pitch**2)
+        loaded = CattaneoMindlin(hertz, ramp.friction, sheared * ramp.tangential_force * sliding_force)
+        return _fields(loaded, position, ramp.pitch**2)
 
     noise = (marker_noise, force_noise, np.random.default_rng(seed))
-    return _log(time, position, ramp.pitch, [frame(k) for k in range(len(time))], ramp.friction, noise)
+    return _log(
+        time, position, ramp.pitch, list(map(frame, normal.tolist(), tangential.tolist())), ramp.friction, noise
+    )
 
 
 def _log(

@@ -13,6 +13,7 @@ from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTrace
 from db.errors import DriverMissing
 from service.demo.server import running_server
 from service.observability import traces
+from tests import forking
 from tests.waiting import wait_until
 
 STAGES = ["frames", "slip_state", "samples", "friction_model"]
@@ -35,6 +36,22 @@ class Collector(BaseHTTPRequestHandler):
 
     def log_message(self, *_: object) -> None:
         pass
+
+
+class Forked:
+    """A command ``python -m ...`` as of ``subprocess.Popen``, by a process that has the imports behind it."""
+
+    def __init__(self, command: list[str], env: dict[str, str], stdout: Any, **_: object) -> None:
+        assert command[:2] == [sys.executable, "-m"]
+        self._process = forking.start_module(tuple(command[2:]), env, Path(stdout.name))
+        self.terminate = self._process.terminate
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self, timeout: float) -> None:
+        self._process.join(timeout)
+        assert self._process.exitcode is not None
 
 
 @pytest.fixture
@@ -68,6 +85,7 @@ def test_an_upload_is_one_trace_from_its_request_to_its_model(
 ) -> None:
     monkeypatch.setenv("STICTION_DATABASE_URL", new_url(tmp_path))
     headers = {"traceparent": CALLER}
+    monkeypatch.setattr(subprocess, "Popen", Forked)
     with running_server(tmp_path) as url, httpx.Client(base_url=url, headers=headers, timeout=60.0) as client:
         client.post("/v1/materials", json={"name": "paper"}).raise_for_status()
         job = upload(client, content, material="paper").json()["job"]["id"]
