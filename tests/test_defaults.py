@@ -48,7 +48,7 @@ LAYOUT = {
     "slipcore/detection/strain_rate/step.py": {"ROWS"},
     "estimators/linear/grasp_statistics.py": {"POOLED", "UNKNOWN", "ALIKE", "ALONE"},
     "estimators/linear/lasting_errors.py": {"SPARE"},
-    "slipcore/contact/solver/tangent_space.py": {"OUTSIDE", "STICK", "SLIP"},
+    "slipcore/contact/solver/tangent_space.py": {"FIELDS"},
     "slipcore/detection/filter/slip_limit.py": {"SCRATCH_ROWS", "_BLOCK"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
     "slipcore/detection/shared/lasting_noise.py": {"SPREAD", "STEP", "ROWS", "OF_STENCIL", "OF_QUARTILE"},

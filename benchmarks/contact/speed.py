@@ -117,9 +117,7 @@ def step_cost(what: str, cells: int, residual: float, target: float | None, pois
     needed = float(np.median([applications(r.applications) for r in results]))
     one, inverse = convolution(cells, poisson)
     rounds = float(np.mean([r.iterations for r in results]))
-    # A convolution for the start, and two a round beside those of conjugate gradients; a preconditioner as often as
-    # these, and once more a round.
-    inverted = float(np.mean([r.applications.tangential for r in results])) - 1.0 - rounds
+    inverted = float(np.mean([r.applications.inverse for r in results]))
     return Cost(
         what,
         1e3 * float(np.median([r.seconds for r in results])),

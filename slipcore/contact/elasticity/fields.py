@@ -9,6 +9,7 @@ from slipcore.frames import FloatArray
 
 VECTOR = {"reassoc", "nsz", "contract"}
 """Liberties that compiled sums take to run in vectors; infinities and NaN keep their meaning."""
+_SIZE_BITS = 0x7FFF_FFFF_FFFF_FFFF  # of a number without its sign
 
 
 def inner(a: FloatArray, b: FloatArray) -> float:
@@ -37,8 +38,7 @@ def lengths(field: FloatArray) -> FloatArray:
 
 def resultants(traction: FloatArray, arm: FloatArray) -> FloatArray:
     """Sums [3] of tractions [2, ...] at ``arm`` [2, ...]: along x, along y, and their moment."""
-    moment = inner(arm[0], traction[1]) - inner(arm[1], traction[0])
-    return np.array([traction[0].sum(), traction[1].sum(), moment])
+    return np.array(_resultants(traction.reshape(2, -1), arm.reshape(2, -1)))
 
 
 def halved(field: FloatArray, beyond: Literal["edge", "constant"] = "edge") -> FloatArray:
@@ -60,6 +60,31 @@ def _doubled_last(field: FloatArray) -> FloatArray:
     around = np.concatenate((field[..., :1], field, field[..., -1:]), axis=-1)
     halves = np.stack((0.75 * field + 0.25 * around[..., :-2], 0.75 * field + 0.25 * around[..., 2:]), axis=-1)
     return halves.reshape(*field.shape[:-1], -1)
+
+
+@compiled
+def largest(field: FloatArray) -> float:
+    """Largest size of the numbers of a contiguous field; NaN where one is NaN.
+
+    Taken as whole numbers, bits without the sign are in the order of sizes, NaN above infinity: these run in vectors.
+    """
+    found = np.zeros(1, dtype=np.int64)
+    bits, most = field.reshape(-1).view(np.int64), 0
+    for i in range(bits.size):
+        most = max(most, bits[i] & _SIZE_BITS)
+    found[0] = most
+    return float(found.view(np.float64)[0])
+
+
+@compiled(fastmath=VECTOR)
+def _resultants(traction: FloatArray, arm: FloatArray) -> tuple[float, float, float]:
+    sx = sy = sm = 0.0
+    for i in range(arm.shape[1]):
+        qx, qy = traction[0, i], traction[1, i]
+        sx += qx
+        sy += qy
+        sm += arm[0, i] * qy - arm[1, i] * qx
+    return sx, sy, sm
 
 
 @compiled(fastmath=VECTOR)

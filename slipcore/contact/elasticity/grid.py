@@ -1,12 +1,15 @@
 """The solver's grid of equal rectangular cells."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
 
+Number = TypeVar("Number", bound=np.generic)
 Box = tuple[slice, slice]
 """Rows and columns of a part of a grid."""
 
@@ -59,6 +62,15 @@ class Grid:
 
 def _centres(count: int, pitch: float, centre: float) -> FloatArray:
     return centre + pitch * (np.arange(count, dtype=np.float64) - (count - 1) / 2)
+
+
+def on_whole(grid: Grid, box: Box, part: NDArray[Number]) -> NDArray[Number]:
+    """A field [..., rows, columns] of the cells in a box, on the whole grid: zero elsewhere."""
+    if part.shape[-2:] == grid.shape:
+        return part
+    whole = np.zeros((*part.shape[:-2], *grid.shape), dtype=part.dtype)
+    whole[..., *box] = part
+    return whole
 
 
 def bounding_box(mask: BoolArray, multiple: int = 1) -> Box:

@@ -13,11 +13,12 @@ from slipcore.frames import FloatArray
 
 @dataclass(slots=True)
 class Count:
-    """How often the operators of one problem were applied."""
+    """How often the operators of one problem were applied, and the approximate ``inverse`` of the tangential one."""
 
     normal: int = 0
     tangential: int = 0
     coupling: int = 0
+    inverse: int = 0
 
     def since(self, earlier: "Count") -> "Count":
         """What was added to an earlier count."""

@@ -24,25 +24,35 @@ class Stress(NamedTuple):
 
 def continuation(before: FloatArray, drive: FloatArray) -> float:
     """How far the last step's change of stress goes on in this one: along the same drive, never backward."""
-    size = float((before**2).sum())
-    return min(max(float((before * drive).sum()) / size, 0.0), STEP.longest_extrapolation) if size > 0.0 else 0.0
+    size = float(before @ before)
+    return min(max(float(before @ drive) / size, 0.0), STEP.longest_extrapolation) if size > 0.0 else 0.0
 
 
 def extrapolated(now: Stress, before: Stress, share: float) -> Stress:
     """Stresses after ``share`` of the change from ``before`` to ``now`` once more."""
-    pressure = np.maximum(now.pressure + share * (now.pressure - before.pressure), 0.0)
-    limit = np.maximum(now.limit + share * (now.limit - before.limit), 0.0)
+    pressure = _continued(now.pressure.reshape(-1), before.pressure.reshape(-1), share).reshape(now.pressure.shape)
+    limit = _continued(now.limit.reshape(-1), before.limit.reshape(-1), share).reshape(now.limit.shape)
     traction = np.empty_like(now.traction)
     _extrapolate_traction(
         now.traction.reshape(2, -1),
         before.traction.reshape(2, -1),
-        now.limit.ravel(),
-        before.limit.ravel(),
-        limit.ravel(),
+        now.limit.reshape(-1),
+        before.limit.reshape(-1),
+        limit.reshape(-1),
         share,
         traction.reshape(2, -1),
     )
     return Stress(pressure, traction, limit)
+
+
+@compiled
+def _continued(now: FloatArray, before: FloatArray, share: float) -> FloatArray:
+    """Values [n] after ``share`` of their change once more, never below zero."""
+    following = np.empty_like(now)
+    for i in range(now.size):
+        value = now[i] + share * (now[i] - before[i])
+        following[i] = value if value > 0.0 else 0.0
+    return following
 
 
 @compiled

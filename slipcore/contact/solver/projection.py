@@ -12,11 +12,12 @@ import numpy as np
 
 from slipcore.compilation import compiled
 from slipcore.contact.defaults import PROJECTION, TINY
-from slipcore.contact.elasticity.fields import VECTOR
+from slipcore.contact.elasticity.fields import VECTOR, largest
 from slipcore.frames import BoolArray, FloatArray
 
 # What compiled loops hold fixed; what each means stands in the table.
 _BLOCK, _FLAT, _LONGEST, _TINY = PROJECTION.block, PROJECTION.flat, PROJECTION.longest, TINY
+_TIGHT = PROJECTION.tight
 _SEARCH_STEPS, _SLOPE, _GROWTH, _BRACKET = (
     PROJECTION.search_steps,
     PROJECTION.slope,
@@ -75,27 +76,28 @@ def project(
     first = np.zeros(3) if start is None else np.where(given, start, 0.0)
     traction = np.empty_like(point)
     point = np.ascontiguousarray(point)  # a view of a larger array would be compiled for once more
-    constraints, bounds = (point, radius, arm, target, given), (PROJECTION.tight * radius.sum(), max_iterations)
-    motion, imbalance, iterations, feasible = _dual_newton(constraints, first, traction, bounds)
+    motion, imbalance, iterations, feasible = nearest_tractions(
+        (point, radius, arm, target, given), first, traction, max_iterations
+    )
     return Projection(traction, motion, imbalance, iterations, feasible)
 
 
 @compiled
-def _dual_newton(
+def nearest_tractions(
     given_constraints: tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray],
     motion: FloatArray,
     traction: FloatArray,
-    bounds: tuple[float, int],
+    max_iterations: int,
 ) -> tuple[FloatArray, FloatArray, int, bool]:
-    """Newton's steps on φ from a dual ``motion``; fills the ``traction``.
+    """``project`` for compiled code: Newton's steps on φ from a dual ``motion``; fills the ``traction``.
 
-    ``bounds``: imbalance that is none, and most steps. The constraints come as a plain tuple, which enters compiled
-    code four times as fast as a named one.
+    The constraints come as a plain tuple, which enters compiled code four times as fast as a named one.
     """
-    constraints, (tight, max_iterations) = Constraints(*given_constraints), bounds
+    constraints = Constraints(*given_constraints)
+    tight = _TIGHT * _sum(constraints.radius)
     here = Evaluation(traction, np.empty(3), np.empty((3, 3)))
     trial = Evaluation(traction, np.empty(3), np.empty((3, 3)))
-    feasible, reach = True, _largest(constraints.radius) + _largest(constraints.point.reshape(-1))
+    feasible, reach = True, largest(constraints.radius) + largest(constraints.point)
     if not 2.0 * reach * reach < np.inf:  # its square, too: an infinite one would make the traction 0, not the limit
         traction[:] = np.nan
         return motion, np.full(3, np.nan), 0, feasible
@@ -252,14 +254,9 @@ def _taken_up(radius: FloatArray, arm_x: FloatArray, arm_y: FloatArray, motion: 
     return taken
 
 
-@compiled
-def _largest(field: FloatArray) -> float:
-    """Largest size of the numbers of a flat field; NaN where one is NaN."""
-    largest = 0.0
+@compiled(fastmath=VECTOR)
+def _sum(field: FloatArray) -> float:
+    total = 0.0
     for i in range(field.size):
-        size = abs(field[i])
-        if not size <= largest:
-            largest = size
-            if np.isnan(size):
-                break
-    return largest
+        total += field[i]
+    return total

@@ -3,6 +3,7 @@
 ``start`` gives the state of bodies apart, ``step`` the next state and what happened on the way.
 """
 
+import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -10,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from slipcore.contact.defaults import STEP, TINY
-from slipcore.contact.elasticity.fields import lengths, rigid_displacement
-from slipcore.contact.elasticity.grid import Grid, bounding_box
+from slipcore.contact.elasticity.fields import lengths
+from slipcore.contact.elasticity.grid import Grid, bounding_box, on_whole
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Count, Operators
 from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
@@ -141,7 +142,9 @@ class QuasiStatic:
         if before is None or now is None or now == 0.0 or not all(load.given):
             return max(STEP.least_share, STEP.unknown_share)
         capacity = float(self.friction.max()) * now
-        shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.stress.pressure, self.grid)
+        shear = float(np.hypot(drive[0], drive[1]))
+        if drive[2] != 0.0:
+            shear += abs(drive[2]) / _lever(state.stress.pressure, self.grid)
         return float(np.clip(max(abs(now - before) / now, shear / max(capacity, TINY)), STEP.least_share, 1.0))
 
     def _advance(
@@ -165,8 +168,7 @@ class QuasiStatic:
             displacement = displacement + recalled[:2]
         speed = state.speed
         if self.problem.velocity_laws:
-            speed = np.zeros_like(pressure)
-            speed[solution.box] = lengths(solution.tangential.slip) / load.duration
+            speed = on_whole(self.grid, solution.box, lengths(solution.tangential.slip) / load.duration)
         return ContactState(
             normal=solution.normal,
             stress=stress,
@@ -184,10 +186,9 @@ class QuasiStatic:
 
     def _slid(self, state: ContactState, solution: StepSolution) -> FloatArray:
         """Slip [2, ny, nx] m of the cells that touched at the step's begin and slide at its end."""
-        slip, tangential, box = np.zeros_like(state.slip), solution.tangential, solution.box
+        tangential, box = solution.tangential, solution.box
         sliding = tangential.slides & (solution.limit > 0.0) & (state.stress.pressure[box] > 0.0)
-        slip[:, *box] = np.where(sliding, tangential.slip, 0.0)
-        return slip
+        return on_whole(self.grid, box, np.where(sliding, tangential.slip, 0.0))
 
     def _displacement(
         self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: StepSolution | None = None
@@ -210,21 +211,21 @@ class QuasiStatic:
         self, equations: StepEquations, state: ContactState, after: ContactState, solution: StepSolution
     ) -> StepResult:
         normal, tangential, box = solution.normal, solution.tangential, solution.box
-        contact = normal.pressure > 0.0
-        slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)
+        contact, force = normal.pressure > 0.0, np.empty((3, *self.grid.shape))
         touching = contact[box]
-        slip[:, *box] = np.where(touching, tangential.slip, 0.0)
-        at_limit[box] = touching & (lengths(tangential.traction) >= (1.0 - STEP.at_limit) * solution.limit)
-        moved[box] = lengths(slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
-        creep = sum(after.creep, start=np.zeros_like(after.elastic))
+        slip = np.where(touching, tangential.slip, 0.0)
+        at_limit = touching & (lengths(tangential.traction) >= (1.0 - STEP.at_limit) * solution.limit)
+        moved = lengths(slip) > self._noticeable(equations, solution, after.pose - state.pose)
+        np.multiply(after.stress.traction, self.grid.cell_area, out=force[:2])
+        np.multiply(after.stress.pressure, self.grid.cell_area, out=force[2])
         return StepResult(
-            displacement=after.elastic + creep,
-            force=np.stack((*after.stress.traction, after.stress.pressure)) * self.grid.cell_area,
+            displacement=sum(after.creep, start=after.elastic),
+            force=force,
             limit=after.stress.limit * self.grid.cell_area,
-            slip=slip,
+            slip=on_whole(self.grid, box, slip),
             contact=contact,
-            at_limit=at_limit,
-            moved=moved,
+            at_limit=on_whole(self.grid, box, at_limit),
+            moved=on_whole(self.grid, box, moved),
             pose=after.pose,
             approach=normal.approach,
             sliding=tangential.sliding and bool(contact.any()),
@@ -240,9 +241,10 @@ class QuasiStatic:
         """Slip m above which a cell moves against the object: a share of the object's motion, and more than solver
         noise.
         """
-        part = self.grid.part(solution.box)
-        carried = float(lengths(rigid_displacement(np.stack(part.points()), motion)).max())
-        kernel = equations.operators.on(part).influence("xx")
+        (rows, columns), (dx, dy, turn) = solution.box, motion
+        x, y = self.grid.x[columns], self.grid.y[rows]
+        carried = max(math.hypot(dx - turn * b, dy + turn * a) for a in x[[0, -1]] for b in y[[0, -1]])  # the corners
+        kernel = equations.operators.on(self.grid).influence("xx")
         compliance = 0.0 if kernel is None else float(kernel[0, 0])
         return max(STEP.moved * carried, STEP.noise * equations.tolerance * float(solution.limit.max()) * compliance)
 
@@ -260,12 +262,14 @@ def _rate(before: StepLoad, load: StepLoad, drive: FloatArray) -> FloatArray:
         pressed, change = load.normal_force, load.normal_force - before.normal_force
     else:
         pressed, change = load.approach or 0.0, (load.approach or 0.0) - (before.approach or 0.0)
-    changes, sizes = np.append(change, drive), np.abs(np.append(pressed, load.tangential))
-    return np.where(np.abs(changes) <= STEP.rounding * sizes, 0.0, changes) / load.duration
+    changes, sizes = np.array([change, *drive]), np.abs([pressed, *load.tangential])
+    steady = np.abs(changes) <= STEP.rounding * sizes
+    changes[steady] = 0.0
+    return changes / load.duration
 
 
 def _lever(pressure: FloatArray, grid: Grid) -> float:
     """Half the extent of the contact, m; the grid's where there is none yet."""
     touching = pressure > 0.0
-    rows, columns = grid.part(bounding_box(touching if touching.any() else ~touching)).shape
-    return 0.5 * max((columns - 1) * grid.pitch[0], (rows - 1) * grid.pitch[1], min(grid.pitch))
+    rows, columns = (part.stop - part.start for part in bounding_box(touching if touching.any() else ~touching))
+    return 0.5 * float(max((columns - 1) * grid.pitch[0], (rows - 1) * grid.pitch[1], min(grid.pitch)))

@@ -32,6 +32,8 @@ def solve_carrying(equations: StepEquations, carried: FloatArray, made: FloatArr
     """The solution of a step's equations with the slip c s′ ``carried`` over [2, ny, nx] m from the step before and,
     where slip ends, with what is ``made`` [2, ny, nx] m of it until then.
     """
+    if not (carried.any() or made.any()):
+        return equations.solve(guess)
     may_end = np.any((carried != 0.0) | (made != 0.0), axis=0)
     while True:
         solution = replace(equations, offset=equations.offset - carried).solve(guess)

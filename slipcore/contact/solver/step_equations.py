@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.contact.defaults import STEP, TINY
-from slipcore.contact.elasticity.fields import inner, lengths, rigid_displacement
-from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
+from slipcore.contact.elasticity.fields import inner, largest, lengths, rigid_displacement
+from slipcore.contact.elasticity.grid import Box, Grid, bounding_box, on_whole
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.solver.extrapolation import Stress
@@ -125,17 +125,14 @@ class StepEquations:
 
     def stress(self, solution: StepSolution) -> Stress:
         """Stresses of a solution on the whole grid."""
-        limit = np.zeros(self.grid.shape)
-        limit[solution.box] = solution.limit
+        limit = on_whole(self.grid, solution.box, solution.limit)
         return Stress(solution.normal.pressure, self._whole(solution), limit)
 
     def _lift(self, traction: FloatArray) -> FloatArray:
         return self.operators.on(self.grid).normal_by_traction(traction)
 
     def _whole(self, solution: StepSolution) -> FloatArray:
-        whole = np.zeros((2, *self.grid.shape))
-        whole[:, *solution.box] = solution.tangential.traction
-        return whole
+        return on_whole(self.grid, solution.box, solution.tangential.traction)
 
     def _normal(self, pressure: FloatArray, height: FloatArray, tolerance: float) -> NormalContact:
         return self.known or solve_normal(
@@ -197,6 +194,6 @@ class StepEquations:
 
 def _coulomb_limit(coefficient: FloatArray, pressure: FloatArray) -> FloatArray:
     """μp where the coefficient is positive."""
-    if not np.isfinite(coefficient).all():
+    if not np.isfinite(largest(np.ascontiguousarray(coefficient))):
         raise InvalidInput("friction coefficient", "not finite at some pressure or velocity", "finite in all contacts")
     return np.maximum(coefficient, 0.0) * pressure

@@ -17,16 +17,29 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.contact.defaults import TANGENTIAL, TINY
-from slipcore.contact.elasticity.fields import VECTOR, doubled, halved, lengths, resultants, rigid_displacement
+from slipcore.contact.defaults import PROJECTION, TANGENTIAL, TINY
+from slipcore.contact.elasticity.fields import VECTOR, doubled, halved, largest, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.contact.elasticity.transform import Compiled, convolve
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.limit_load import limit_load
-from slipcore.contact.solver.projection import project
+from slipcore.contact.solver.projection import nearest_tractions, project
 from slipcore.contact.solver.sliding import sliding_traction
-from slipcore.contact.solver.tangent_space import TangentSpace
+from slipcore.contact.solver.tangent_space import FIELDS, newton_move, outward, survey
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
+
+# What compiled loops hold fixed; what each means stands in the table.
+_SLOPE_ROUNDING, _MOVE_ROUNDING, _PROJECTION_STEPS = (
+    TANGENTIAL.slope_rounding,
+    TANGENTIAL.move_rounding,
+    PROJECTION.newton_steps,
+)
+_REDUCTION, _ITERATIONS, _SLOW = TANGENTIAL.reduction, TANGENTIAL.iterations, TANGENTIAL.slow
+Fields = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+"""Traction, displacement, offset, slip and nearest feasible traction, each [2, ny, nx]."""
+Constraints = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
+"""Limits [n], arm [2, n], and the resultants [3] that are given [3]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,45 +113,43 @@ class _TangentialStep:
         offset: FloatArray,
         control: SolverControl,
     ) -> None:
-        self.operator, self.limit, self.control = operator, limit, control
-        self.given = control.given
-        x, y = points
-        touching = limit > 0.0
-        self.length = float(np.hypot(np.ptp(x[touching]), np.ptp(y[touching]))) / 2 or max(operator.grid.pitch)
+        self.operator, self.limit, self.control = operator, np.ascontiguousarray(limit), control
+        self.given, self.arm = control.given, np.stack(points)
+        radius = self.limit.reshape(-1)
+        extent, self.largest, self.capacity = _extent(self.arm.reshape(2, -1), radius)
+        self.length = extent or max(operator.grid.pitch)
+        self.arm /= self.length
         self.units = np.array([1.0, 1.0, self.length])
-        self.arm = np.stack((x, y)) / self.length
         self.target = control.load / self.units / operator.grid.cell_area
-        self.original = offset
-        self.offset = offset - rigid_displacement(self.arm, np.where(self.given, 0.0, control.motion * self.units))
+        self.constraints = radius, self.arm.reshape(2, -1), self.target, self.given
+        self.original, self.offset = offset, np.ascontiguousarray(offset)
+        moved = np.where(self.given, 0.0, control.motion * self.units)
+        if moved.any():
+            self.offset = offset - rigid_displacement(self.arm, moved)
         kernel = operator.influence("xx")
         assert kernel is not None  # no body is rigid
         self.stiffness = 1.0 / float(kernel[0, 0])
-        self.largest, self.capacity = float(limit.max()), float(limit.sum())
         self.dual = np.zeros(3)
 
     def solve(self, start: FloatArray, tolerance: float, max_iterations: int) -> TangentialContact:
         traction, feasible = self.project(start)
         if not feasible:
             return self._at_the_limit()
+        here, before, first = self._at(traction), np.inf, 0
+        residual = self._residual(here)
+        if TANGENTIAL.far_start < residual < np.inf and min(self.limit.shape) >= 2 * TANGENTIAL.coarsest:
+            here, before, first = self._at(self.project(self._from_coarse(traction))[0]), residual, 1
+            residual = self._residual(here)
+        residual, iterations = self._go_on(here, (before, residual), tolerance, (first, max_iterations))
+        if not residual <= tolerance or iterations == max_iterations:
+            raise NotConverged("tangential contact", residual, tolerance, iterations)
+        result = self._result(here, residual, iterations)
+        return self._at_the_limit(result) if result.sliding and self.given.all() else result
+
+    def _at(self, traction: FloatArray) -> Fields:
+        """What belongs to tractions, its last two yet to be found."""
         displacement = self.operator.tangential(traction)
-        residual = np.inf
-        for iteration in range(max_iterations):
-            gradient, point = _descend(traction, displacement, self.offset, self.stiffness)
-            nearest, _ = self.project(point, keep=True)
-            before, residual = residual, _largest_change(traction, nearest) / self.largest
-            if not np.isfinite(residual):
-                raise NotConverged("tangential contact", residual, tolerance, iteration)
-            if iteration == 0 and residual > TANGENTIAL.far_start and min(self.limit.shape) >= 2 * TANGENTIAL.coarsest:
-                traction, _ = self.project(self._from_coarse(traction))
-                displacement = self.operator.tangential(traction)
-                continue
-            if residual <= tolerance:
-                result = self._result(traction, displacement, residual, iteration)
-                return self._at_the_limit(result) if result.sliding and self.given.all() else result
-            slip = _against(gradient, self.arm, self.dual / self.stiffness)
-            trial = nearest if residual > TANGENTIAL.slow * before and iteration % 2 else self._newton(traction, slip)
-            traction, displacement = self._search(traction, displacement, slip, trial)
-        raise NotConverged("tangential contact", residual, tolerance, max_iterations)
+        return traction, displacement, self.offset, np.empty_like(traction), np.empty_like(traction)
 
     def _from_coarse(self, traction: FloatArray) -> FloatArray:
         """The tractions of a grid of half as many cells a side, interpolated."""
@@ -153,70 +164,43 @@ class _TangentialStep:
             return traction
         return doubled(coarse.traction, self.limit.shape)
 
-    def project(self, point: FloatArray, keep: bool = False) -> tuple[FloatArray, bool]:
-        """Nearest feasible traction; ``keep`` its dual, which is the rigid motion when the point is a gradient step."""
-        flat = project(
-            point.reshape(2, -1),
-            self.limit.ravel(),
-            self.arm.reshape(2, -1),
-            self.target,
-            self.given,
-            self.dual if keep else None,
-        )
-        if keep:
-            self.dual = flat.motion
+    def project(self, point: FloatArray) -> tuple[FloatArray, bool]:
+        """Nearest feasible traction."""
+        flat = project(point.reshape(2, -1), *self.constraints)
         return flat.traction.reshape(point.shape), flat.feasible
 
-    def _newton(self, traction: FloatArray, slip: FloatArray) -> FloatArray:
-        space = TangentSpace(traction, slip, self.limit, self.stiffness, self.arm, self.given)
-        lacking = self.target - resultants(traction + space.onto_circle, self.arm)
-        move = space.onto_circle + space.balancing(lacking)
-        image = slip.copy()
-        if np.abs(move).max() > TANGENTIAL.move_rounding * self.largest:
-            image += self.operator.tangential(move)
-        move += space.conjugate_gradients(self.operator, image, move, TANGENTIAL.reduction, TANGENTIAL.iterations)
-        return self.project(space.outward(traction + move))[0]
-
-    def _search(
-        self, traction: FloatArray, displacement: FloatArray, slip: FloatArray, trial: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """The best point on the way to a feasible trial; the whole way where that at least does not climb.
-
-        The slope is taken with the slip, not with the gradient: the rigid motion in the latter does no work on a
-        balanced way, but its rounding would drown the slope near the solution.
+    def _residual(self, here: Fields) -> float:
+        """How far a gradient step leads before it is projected back, as a share of the largest limit; fills the slip
+        and the nearest feasible traction. The projection's dual, which is kept, is the rigid motion.
         """
-        way = trial - traction
-        response = self.operator.tangential(way)
-        slope, curvature, work = _slopes(slip, way, response, self.limit)
-        best = -slope / curvature if curvature > 0.0 and abs(slope) > TANGENTIAL.slope_rounding * work else 1.0
-        share = 1.0 if best >= 0.5 else max(best, 0.0)
-        if share == 1.0:
-            return trial, displacement + response
-        return traction + share * way, displacement + share * response
+        self.dual, change = _natural_map(here, self.constraints, self.stiffness, self.dual)
+        return change / self.largest
 
-    def _result(
-        self, traction: FloatArray, displacement: FloatArray, residual: float, iterations: int
-    ) -> TangentialContact:
-        scaled = np.where(self.given, self.dual / self.stiffness, self.control.motion * self.units)
-        slip = displacement + self.offset - rigid_displacement(self.arm, np.where(self.given, scaled, 0.0))
+    def _go_on(
+        self, here: Fields, residuals: tuple[float, float], tolerance: float, rounds: tuple[int, int]
+    ) -> tuple[float, int]:
+        """Newton's steps, in place, from the last two residuals and the first round to the tolerance or to the last
+        round; the residual there, and the round.
+        """
+        by = self.operator.tangential_compiled, self.operator.tangential_inverse.compiled
+        how = self.stiffness, self.largest, tolerance
+        self.dual, residual, iterations, counts = _rounds(here, self.constraints, by, how, self.dual, residuals, rounds)
+        self.operator.count.tangential += counts[0]
+        self.operator.count.inverse += counts[1]
+        return residual, iterations
+
+    def _result(self, here: Fields, residual: float, iterations: int) -> TangentialContact:
+        traction, displacement, _, slip, _ = here
+        motion = np.where(self.given, self.dual / self.stiffness / self.units, self.control.motion)
         lacking = (self.target - resultants(traction, self.arm)) * self.given
         imbalance = float(np.abs(lacking).max()) / self.capacity
         if not imbalance <= TANGENTIAL.balance:
             raise NotConverged("balance of the tangential load", imbalance, TANGENTIAL.balance, iterations)
-        if not np.isfinite(slip).all():
+        if not np.isfinite(largest(slip)):
             raise NotConverged("slip of the tangential contact", np.nan, residual, iterations)
-        slides = lengths(traction - self.stiffness * slip) > self.limit
-        return TangentialContact(
-            traction,
-            displacement,
-            slip,
-            scaled / self.units,
-            residual,
-            imbalance,
-            iterations,
-            slides,
-            bool(slides[self.limit > 0.0].all()),
-        )
+        slides = np.empty(self.limit.shape, dtype=bool)
+        sliding = _slides(traction, slip, self.limit, self.stiffness, slides)
+        return TangentialContact(traction, displacement, slip, motion, residual, imbalance, iterations, slides, sliding)
 
     def _at_the_limit(self, balanced: TangentialContact | None = None) -> TangentialContact:
         """All slides: the load is on the limit surface, or it is refused; ``balanced`` holds where it is inside.
@@ -230,48 +214,152 @@ class _TangentialStep:
         if balanced is not None and factor > 1.0 + TANGENTIAL.limit_margin:
             return balanced
         traction = sliding_traction(radius, arm, direction).reshape(self.offset.shape)
-        displacement = self.operator.tangential(traction)
-        along = rigid_displacement(self.arm, direction)
-        lag = ((displacement + self.offset) * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=TINY)
+        here = self._at(traction)
+        gradient, along = here[1] + self.offset, rigid_displacement(self.arm, direction)
+        lag = (gradient * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=TINY)
         self.dual = direction * float(lag[self.limit > 0.0].max()) * self.stiffness
-        return self._result(traction, displacement, 0.0, 0)._replace(sliding=True)
+        moved = np.where(self.given, self.dual / self.stiffness, 0.0)
+        np.subtract(gradient, rigid_displacement(self.arm, moved), out=here[3])
+        return self._result(here, 0.0, 0)._replace(sliding=True)
 
 
 @compiled
-def _descend(
-    traction: FloatArray, displacement: FloatArray, offset: FloatArray, stiffness: float
-) -> tuple[FloatArray, FloatArray]:
-    """The gradient, and the point that a step of length ``stiffness`` against it leads to."""
-    gradient, point = np.empty_like(traction), np.empty_like(traction)
-    q, u, c = traction.reshape(-1), displacement.reshape(-1), offset.reshape(-1)
-    g, w = gradient.reshape(-1), point.reshape(-1)
+def _extent(points: FloatArray, limit: FloatArray) -> tuple[float, float, float]:
+    """Half the diagonal of the box [m] around the points [2, n] that touch; the largest limit [n], and their sum."""
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    top = total = 0.0
+    for i in range(limit.size):
+        total += limit[i]
+        if limit[i] > 0.0:
+            x, y = points[0, i], points[1, i]
+            low_x, low_y, high_x, high_y = min(low_x, x), min(low_y, y), max(high_x, x), max(high_y, y)
+            top = max(top, limit[i])
+    extent = 0.5 * np.hypot(high_x - low_x, high_y - low_y) if top > 0.0 else 0.0
+    return extent, total if np.isnan(total) else top, total
+
+
+@compiled
+def _rounds(
+    here: Fields,
+    constraints: Constraints,
+    by: tuple[Compiled, Compiled],
+    how: tuple[float, float, float],
+    dual: FloatArray,
+    residuals: tuple[float, float],
+    rounds: tuple[int, int],
+) -> tuple[FloatArray, float, int, tuple[int, int]]:
+    """``_TangentialStep._go_on``: the dual, the last residual, the round, and how often operator and preconditioner
+    were taken, which it is done ``by``.
+
+    ``how``: the stiffness that scales a gradient step, the largest limit, and the tolerance. Where Newton's steps
+    stall, the gradient step is taken every other time.
+    """
+    (traction, displacement, _, slip, nearest), (stiffness, top, tolerance) = here, how
+    (before, residual), (iteration, last), applied, inverted = residuals, rounds, 0, 0
+    while iteration < last and tolerance < residual < np.inf:
+        trial = nearest.copy()
+        if residual <= _SLOW * before or iteration % 2 == 0:
+            counts = _newton(traction, slip, trial, constraints, by, (stiffness, _MOVE_ROUNDING * top))
+            applied, inverted = applied + counts[0], inverted + counts[1]
+        _search((traction, displacement), slip, trial, constraints[0], by[0])
+        dual, change = _natural_map(here, constraints, stiffness, dual)
+        before, residual = residual, change / top
+        applied, iteration = applied + 1, iteration + 1
+    return dual, residual, iteration, (applied, inverted)
+
+
+@compiled
+def _newton(
+    traction: FloatArray,
+    slip: FloatArray,
+    trial: FloatArray,
+    constraints: Constraints,
+    by: tuple[Compiled, Compiled],
+    how: tuple[float, float],
+) -> tuple[int, int]:
+    """Fill the ``trial`` with where a Newton step leads, projected back; how often it took what it is done ``by``."""
+    (radius, arm, target, given), (stiffness, negligible) = constraints, how
+    cells, q, p = np.empty((FIELDS, radius.size)), traction.reshape(2, -1), trial.reshape(2, -1)
+    inverse_gram = survey((q, slip.reshape(2, -1), radius, stiffness), (arm, given), cells)
+    space, onto_circle = (cells[:3], arm, inverse_gram, cells[5], cells[6]), cells[3:5].reshape(traction.shape)
+    bounds = negligible, _REDUCTION, _ITERATIONS
+    move, count, inverted = newton_move(space, (traction, slip, onto_circle), target, by, bounds)
+    point = np.empty_like(q)
+    outward(q, move.reshape(2, -1), cells[6], point)
+    nearest_tractions((point, radius, arm, target, given), np.zeros(3), p, _PROJECTION_STEPS)
+    return count, inverted
+
+
+@compiled
+def _natural_map(
+    here: Fields, constraints: Constraints, stiffness: float, dual: FloatArray
+) -> tuple[FloatArray, float]:
+    """Fill the slip and the feasible traction nearest to a gradient step; the dual of that, from a guess of it, and the
+    largest change of traction.
+    """
+    (traction, displacement, offset, slip, nearest), (radius, arm, target, given) = here, constraints
+    point = np.empty_like(traction)
+    q, u, c, w = traction.reshape(-1), displacement.reshape(-1), offset.reshape(-1), point.reshape(-1)
+    g, p = slip.reshape(-1), nearest.reshape(-1)
     for i in range(q.size):
         slope = u[i] + c[i]
         g[i], w[i] = slope, q[i] - stiffness * slope
-    return gradient, point
+    step = point.reshape(2, -1), radius, arm, target, given
+    dual, _, _, _ = nearest_tractions(step, dual, nearest.reshape(2, -1), _PROJECTION_STEPS)
+    _subtract_rigid(slip.reshape(2, -1), arm, dual / stiffness)
+    for i in range(q.size):
+        w[i] = p[i] - q[i]
+    return dual, largest(w)
 
 
 @compiled
-def _largest_change(before: FloatArray, after: FloatArray) -> float:
-    """Largest difference of two fields; NaN where one is NaN, which is neither larger nor smaller than anything."""
-    largest, a, b = 0.0, before.reshape(-1), after.reshape(-1)
-    for i in range(a.size):
-        size = abs(b[i] - a[i])
-        if not size <= largest:
-            largest = size
-            if np.isnan(size):
-                break
-    return largest
+def _subtract_rigid(field: FloatArray, arm: FloatArray, motion: FloatArray) -> None:
+    """Subtract a rigid motion [3] from a field [2, n], in place."""
+    mx, my, yaw = motion[0], motion[1], motion[2]
+    for i in range(field.shape[1]):
+        field[0, i] -= mx - yaw * arm[1, i]
+        field[1, i] -= my + yaw * arm[0, i]
 
 
 @compiled
-def _against(gradient: FloatArray, arm: FloatArray, motion: FloatArray) -> FloatArray:
-    """A gradient [2, ny, nx] less a rigid motion [3]."""
-    slip, mx, my, yaw = np.empty_like(gradient), motion[0], motion[1], motion[2]
-    g, a, s = gradient.reshape(2, -1), arm.reshape(2, -1), slip.reshape(2, -1)
-    for i in range(g.shape[1]):
-        s[0, i], s[1, i] = g[0, i] - (mx - yaw * a[1, i]), g[1, i] - (my + yaw * a[0, i])
-    return slip
+def _slides(traction: FloatArray, slip: FloatArray, limit: FloatArray, stiffness: float, slides: BoolArray) -> bool:
+    """Fill in which cells [ny, nx] slide; whether all do that touch."""
+    q, s, radius, found, everywhere = (
+        traction.reshape(2, -1),
+        slip.reshape(2, -1),
+        limit.reshape(-1),
+        slides.reshape(-1),
+        True,
+    )
+    for i in range(radius.size):
+        x, y = q[0, i] - stiffness * s[0, i], q[1, i] - stiffness * s[1, i]
+        found[i] = np.sqrt(x * x + y * y) > radius[i]
+        everywhere &= found[i] or radius[i] <= 0.0
+    return everywhere
+
+
+@compiled
+def _search(
+    here: tuple[FloatArray, FloatArray], slip: FloatArray, trial: FloatArray, limit: FloatArray, operator: Compiled
+) -> None:
+    """Take traction and displacement, ``here``, to the best point on the way to a feasible trial, in place; the whole
+    way where that at least does not climb.
+
+    The slope is taken with the slip, not with the gradient: the rigid motion in the latter does no work on a balanced
+    way, but its rounding would drown the slope near the solution.
+    """
+    traction, displacement = here
+    way, response = trial - traction, np.empty_like(trial)
+    convolve(way, response, operator)
+    slope, curvature, work = _slopes(slip, way, response, limit)
+    best = -slope / curvature if curvature > 0.0 and abs(slope) > _SLOPE_ROUNDING * work else 1.0
+    share = 1.0 if best >= 0.5 else max(best, 0.0)
+    q, u, t = traction.reshape(-1), displacement.reshape(-1), trial.reshape(-1)
+    w, r = way.reshape(-1), response.reshape(-1)
+    for i in range(q.size):
+        q[i] = t[i] if share == 1.0 else q[i] + share * w[i]
+        u[i] += share * r[i]
 
 
 @compiled(fastmath=VECTOR)

@@ -3,10 +3,35 @@
 import numpy as np
 
 from slipcore.contact.elasticity.fields import inner, resultants, rigid_displacement
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.solver import tangent_space as compiled
-from slipcore.contact.solver.tangent_space import OUTSIDE, SLIP, STICK, TangentSpace
+from tests.slipcore.contact.solver.following import body
 
 GIVEN = np.ones(3, dtype=bool)
+
+
+class Found:
+    """What ``survey`` finds, in the shape of the grid."""
+
+    def __init__(
+        self, traction: np.ndarray, slip: np.ndarray, limit: np.ndarray, stiffness: float, arm: np.ndarray
+    ) -> None:
+        fields, here = np.empty((compiled.FIELDS, *limit.shape)), (flat(traction), flat(slip), limit.ravel(), stiffness)
+        self.arm, self.inverse_gram = arm, compiled.survey(here, (flat(arm), GIVEN), flat(fields))
+        self.projector, self.onto_circle, self.curvature, self.scale = fields[:3], fields[3:5], fields[5], fields[6]
+        directions = self.projector[0] + self.projector[2]
+        self.outside, self.sticks = directions == 0.0, directions == 2.0
+        self.slides = ~self.outside & ~self.sticks
+
+    def balanced(self, move: np.ndarray) -> np.ndarray:
+        """The part of a move that lies in the space and has no resultant, in plain numpy."""
+        kept = tangent(self, move)
+        return kept - tangent(self, rigid_displacement(self.arm, self.inverse_gram @ resultants(kept, self.arm)))
+
+    @property
+    def space(self) -> compiled.Space:
+        return flat(self.projector), flat(self.arm), self.inverse_gram, self.curvature.ravel(), self.scale.ravel()
 
 
 def case(seed: int = 0) -> tuple[np.ndarray, ...]:
@@ -19,7 +44,7 @@ def case(seed: int = 0) -> tuple[np.ndarray, ...]:
     return traction, slip, limit, arm, rng.normal(size=(2, 9, 11))
 
 
-def tangent(space: TangentSpace, move: np.ndarray) -> np.ndarray:
+def tangent(space: Found, move: np.ndarray) -> np.ndarray:
     """Restriction to the space, in plain numpy."""
     xx, xy, yy = space.projector
     return np.stack((xx * move[0] + xy * move[1], xy * move[0] + yy * move[1]))
@@ -31,12 +56,12 @@ def flat(field: np.ndarray) -> np.ndarray:
 
 def test_cells_stick_inside_their_disk_and_slide_on_it() -> None:
     traction, slip, limit, arm, _ = case()
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
+    space = Found(traction, slip, limit, 0.5, arm)
     point = np.hypot(*(traction - 0.5 * slip))
-    np.testing.assert_array_equal(space.state == OUTSIDE, limit <= 0.0)
-    np.testing.assert_array_equal(space.state == SLIP, (point > limit) & (limit > 0.0))
-    assert (space.state == STICK).any()
-    sliding = space.state == SLIP
+    np.testing.assert_array_equal(space.outside, limit <= 0.0)
+    np.testing.assert_array_equal(space.slides, (point > limit) & (limit > 0.0))
+    assert (space.sticks).any()
+    sliding = space.slides
     np.testing.assert_allclose(np.hypot(*(traction + space.onto_circle))[sliding], limit[sliding], rtol=1e-14)
     normal = (traction + space.onto_circle) / np.where(limit > 0.0, limit, 1.0)
     opposed = np.maximum(-(slip * normal).sum(axis=0), 0.0) / np.where(limit > 0.0, limit, 1.0)
@@ -45,10 +70,10 @@ def test_cells_stick_inside_their_disk_and_slide_on_it() -> None:
 
 def test_projection_keeps_what_sticks_and_only_turns_what_slides() -> None:
     traction, slip, limit, arm, move = case()
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    kept, sliding = tangent(space, move), space.state == SLIP
-    np.testing.assert_array_equal(kept[:, space.state == STICK], move[:, space.state == STICK])
-    np.testing.assert_array_equal(kept[:, space.state == OUTSIDE], 0.0)
+    space = Found(traction, slip, limit, 0.5, arm)
+    kept, sliding = tangent(space, move), space.slides
+    np.testing.assert_array_equal(kept[:, space.sticks], move[:, space.sticks])
+    np.testing.assert_array_equal(kept[:, space.outside], 0.0)
     normal = (traction + space.onto_circle)[:, sliding] / limit[sliding]
     expected = move[:, sliding] - (move[:, sliding] * normal).sum(axis=0) * normal
     np.testing.assert_allclose(kept[:, sliding], expected, rtol=0.0, atol=1e-13)
@@ -60,29 +85,47 @@ def test_outward_tractions_of_a_solution_are_a_gradient_step() -> None:
     sliding[::2] = True
     traction = np.where(sliding, limit * traction / np.hypot(*traction).clip(min=1e-300), 0.9 * traction)
     slip = np.where(sliding, -0.7 * traction, 0.0)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    np.testing.assert_allclose(space.outward(traction), traction - 0.5 * slip, rtol=1e-13)
+    space = Found(traction, slip, limit, 0.5, arm)
+    half, point = 0.5 * traction, np.empty_like(traction)
+    compiled.outward(flat(half), flat(half), space.scale.ravel(), flat(point))
+    np.testing.assert_allclose(point, traction - 0.5 * slip, rtol=1e-13)
 
 
-def test_balanced_moves_lie_in_the_space_and_carry_no_load() -> None:
-    traction, slip, limit, arm, move = case(1)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    balanced = space.balanced(move.copy())
-    np.testing.assert_allclose(balanced, tangent(space, balanced), rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(resultants(balanced, arm), 0.0, atol=1e-12)
-    np.testing.assert_allclose(space.balanced(balanced.copy()), balanced, rtol=0.0, atol=1e-13)
-
-
-def test_balancing_adds_just_what_is_lacking() -> None:
+def test_the_first_part_of_a_move_leads_onto_the_circles_and_to_the_load() -> None:
     traction, slip, limit, arm, _ = case(2)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    lacking = np.array([0.3, -0.2, 0.7])
-    np.testing.assert_allclose(resultants(space.balancing(lacking), arm), lacking, rtol=1e-11)
+    space, target = Found(traction, slip, limit, 0.5, arm), np.array([0.3, -0.2, 0.7])
+    operator = ElasticOperator((body(),), Grid(limit.shape, (1.0, 1.0)))
+    by, fields = (
+        (operator.tangential_compiled, operator.tangential_inverse.compiled),
+        (traction, slip, space.onto_circle),
+    )
+    move, *counts = compiled.newton_move(space.space, fields, target, by, (np.inf, 0.05, 0))
+    assert counts == [0, 1]
+    np.testing.assert_allclose(resultants(traction + move, arm), target, rtol=1e-11)
+    balancing = move - space.onto_circle
+    np.testing.assert_allclose(balancing, tangent(space, balancing), rtol=0.0, atol=1e-13)
+
+
+def test_newton_moves_take_the_slip_from_the_space() -> None:
+    traction, slip, limit, arm, _ = case(8)
+    operator, target = ElasticOperator((body(),), Grid(limit.shape, (1.0, 1.0))), np.array([0.1, 0.2, -0.3])
+    stiffness = 1.0 / operator.influence("xx")[0, 0]
+    slip *= 0.5 / stiffness
+    space = Found(traction, slip, limit, stiffness, arm)
+    by, fields = (
+        (operator.tangential_compiled, operator.tangential_inverse.compiled),
+        (traction, slip, space.onto_circle),
+    )
+    move, count, inverted = compiled.newton_move(space.space, fields, target, by, (0.0, 1e-9, 400))
+    assert count == inverted > 2
+    left = space.balanced(slip + operator.tangential(move) + space.curvature * move)
+    assert np.abs(left).max() <= 1e-8 * np.abs(space.balanced(slip)).max()
+    np.testing.assert_allclose(resultants(traction + move, arm), target, rtol=0.0, atol=1e-11)
 
 
 def test_rigid_motions_are_subtracted_within_the_space() -> None:
     traction, slip, limit, arm, move = case(3)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
+    space = Found(traction, slip, limit, 0.5, arm)
     motion = np.array([0.4, -0.1, 0.9])
     expected = move - tangent(space, rigid_displacement(arm, motion))
     compiled._subtract_rigid(flat(space.projector), flat(arm), motion, flat(move))
@@ -91,18 +134,20 @@ def test_rigid_motions_are_subtracted_within_the_space() -> None:
 
 def test_stiffening_restricts_and_adds_the_curvature() -> None:
     traction, slip, limit, arm, answer = case(4)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    direction = space.balanced(slip.copy())
-    expected = tangent(space, answer) + np.where(space.state == SLIP, space.curvature, 0.0) * direction
-    product = compiled._stiffen(flat(space.projector), space.curvature.ravel(), flat(direction), flat(answer))
+    space = Found(traction, slip, limit, 0.5, arm)
+    direction = space.balanced(slip)
+    expected = tangent(space, answer) + space.curvature * direction
+    product, sums = compiled._stiffen(
+        flat(space.projector), flat(arm), space.curvature.ravel(), flat(direction), flat(answer)
+    )
     np.testing.assert_allclose(answer, expected, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(product, (direction * expected).sum(), rtol=1e-12)
-    np.testing.assert_allclose(inner(direction, expected), product, rtol=1e-12)
+    np.testing.assert_allclose(product, inner(direction, expected), rtol=1e-12)
+    np.testing.assert_allclose(sums, resultants(expected, arm), rtol=0.0, atol=1e-12)
 
 
 def test_gram_holds_the_products_of_rigid_motions() -> None:
     traction, slip, limit, arm, _ = case(5)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
+    space = Found(traction, slip, limit, 0.5, arm)
     motions = [tangent(space, rigid_displacement(arm, e)) for e in np.eye(3)]
     expected = np.array([[(a * b).sum() for b in motions] for a in motions])
     np.testing.assert_allclose(compiled._gram(flat(space.projector), flat(arm)), expected, rtol=1e-12, atol=1e-12)
@@ -110,26 +155,37 @@ def test_gram_holds_the_products_of_rigid_motions() -> None:
 
 def test_advancing_moves_updates_the_residual_and_scales_it() -> None:
     traction, slip, limit, arm, answer = case(6)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    direction, residual = space.balanced(slip.copy()), space.balanced(np.ones_like(slip))
+    space = Found(traction, slip, limit, 0.5, arm)
+    direction, residual = space.balanced(slip), space.balanced(np.ones_like(slip))
     move, before, response = np.zeros_like(slip), residual.copy(), tangent(space, answer) + space.curvature * direction
     step = 0.25 / inner(direction, response)
-    compiled._advance(space.flat, flat(move), flat(residual), flat(direction), flat(answer), 0.25)
+    compiled._advance(space.space, flat(move), flat(residual), flat(direction), flat(answer), 0.25)
     np.testing.assert_allclose(move, step * direction, rtol=1e-12)
     expected = space.balanced(before + step * response)
     np.testing.assert_allclose(residual, expected, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(answer, space.scale * residual, rtol=1e-14)
 
 
-def test_improving_scales_balances_and_multiplies() -> None:
+def test_improving_scales_restricts_and_multiplies_and_turning_balances() -> None:
     traction, slip, limit, arm, improved = case(7)
-    space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
+    space = Found(traction, slip, limit, 0.5, arm)
+    residual, direction = space.balanced(slip), improved.copy()
     expected = space.balanced(space.scale * improved)
-    product = compiled._improve(space.flat, flat(slip), flat(improved))
-    np.testing.assert_allclose(improved, expected, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(product, (slip * expected).sum(), rtol=1e-12)
+    product, motion = compiled._improve(space.space, flat(residual), flat(improved))
+    np.testing.assert_allclose(product, inner(residual, expected), rtol=1e-12)
+    turned = 0.3 * direction - expected
+    compiled._turn(flat(space.projector), flat(arm), motion, flat(direction), flat(improved), 0.3)
+    np.testing.assert_allclose(direction, turned, rtol=0.0, atol=1e-13)
 
 
 def test_the_inverse_of_a_singular_gram_is_its_pseudo_inverse() -> None:
     gram = np.diag([2.0, 0.0, 1e-3])
     np.testing.assert_allclose(compiled._inverse(gram), np.linalg.pinv(gram), rtol=1e-14)
+
+
+def test_the_inverse_of_a_gram_is_that_of_numpy_up_to_where_a_motion_leaves_the_space() -> None:
+    spread = np.random.default_rng(9).normal(size=(3, 3))
+    for last in (1.0, 1e-3, 1e-5, 1e-7, 1e-9):
+        gram = spread.T @ np.diag([2.0, 1.0, last]) @ spread
+        exact = np.linalg.inv(gram)
+        np.testing.assert_allclose(compiled._inverse(gram), exact, rtol=0.0, atol=1e-14 / last * np.abs(exact).max())

@@ -8,6 +8,7 @@ from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
 from slipcore.contact.solver import tangential as compiled
+from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.tangential import SolverControl, solve_tangential
 
 FRICTION, FORCE = 0.4, 10.0
@@ -135,13 +136,31 @@ def test_applications_stay_few(sphere) -> None:
 
 def test_fused_loops_of_a_newton_round_are_what_numpy_makes_of_them() -> None:
     traction, displacement, offset, arm = np.random.default_rng(0).normal(size=(4, 2, 9, 11))
-    gradient, point = compiled._descend(traction, displacement, offset, 0.7)
-    np.testing.assert_array_equal(gradient, displacement + offset)
-    np.testing.assert_allclose(point, traction - 0.7 * gradient, rtol=0.0, atol=1e-15)
-    assert compiled._largest_change(traction, point) == pytest.approx(np.abs(traction - point).max(), rel=1e-15)
-    motion = np.array([0.3, -0.2, 0.7])
-    slip = compiled._against(gradient, arm, motion)
-    np.testing.assert_allclose(slip, gradient - rigid_displacement(arm, motion), rtol=0.0, atol=1e-15)
-    limit, way, response = np.abs(arm[0]), point, offset
-    expected = ((slip * way).sum(), (way * response).sum(), (np.hypot(*slip) * limit).sum())
-    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit), expected, rtol=1e-13)
+    limit, slip, nearest = np.abs(arm[0]), np.empty_like(traction), np.empty_like(traction)
+    constraints = limit.ravel(), arm.reshape(2, -1), np.array([0.3, -0.2, 0.7]), np.ones(3, dtype=bool)
+    here = traction, displacement, offset, slip, nearest
+    dual, change = compiled._natural_map(here, constraints, 0.7, np.zeros(3))
+    gradient = displacement + offset
+    point = traction - 0.7 * gradient
+    expected = project(point.reshape(2, -1), *constraints)
+    np.testing.assert_allclose(nearest, expected.traction.reshape(2, 9, 11), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(dual, expected.motion, rtol=1e-12)
+    np.testing.assert_allclose(slip, gradient - rigid_displacement(arm, dual / 0.7), rtol=0.0, atol=1e-14)
+    assert change == pytest.approx(np.abs(nearest - traction).max(), rel=1e-15)
+    slides = np.empty(limit.shape, dtype=bool)
+    assert not compiled._slides(traction, slip, limit, 0.7, slides)
+    np.testing.assert_array_equal(slides, np.hypot(*(traction - 0.7 * slip)) > limit)
+    assert compiled._slides(traction, slip, np.where(slides, limit, 0.0), 0.7, slides)
+    way, response = point, offset
+    sums = (slip * way).sum(), (way * response).sum(), (np.hypot(*slip) * limit).sum()
+    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit), sums, rtol=1e-12)
+
+
+def test_the_extent_and_the_limits_of_a_contact_are_found_at_once() -> None:
+    points, limit = np.random.default_rng(1).normal(size=(2, 99)), np.zeros(99)
+    limit[20:60] = np.linspace(1.0, 3.0, 40)
+    extent, largest, capacity = compiled._extent(points, limit)
+    assert extent == pytest.approx(0.5 * np.hypot(*np.ptp(points[:, 20:60], axis=1)), rel=1e-14)
+    assert (largest, capacity) == (3.0, pytest.approx(limit.sum(), rel=1e-14))
+    limit[30] = np.nan
+    assert np.isnan(compiled._extent(points, limit)[1:]).all()

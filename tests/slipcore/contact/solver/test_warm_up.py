@@ -9,11 +9,11 @@ from numba.core.registry import CPUDispatcher
 from slipcore.contact.effects import LoadPath, SensorSampling
 from slipcore.contact.elasticity import fields, transform
 from slipcore.contact.scene import Scene
-from slipcore.contact.solver import extrapolation, normal, projection, tangent_space
+from slipcore.contact.solver import extrapolation, normal, projection, tangential
 from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 
-MODULES = (fields, transform, extrapolation, normal, projection, tangent_space)
+MODULES = (fields, transform, extrapolation, normal, projection, tangential)
 
 
 def called_by(action: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> set[str]:
@@ -42,5 +42,5 @@ def test_every_kernel_that_a_run_calls_is_loaded(monkeypatch: pytest.MonkeyPatch
     plan = Scene("turning", (path, SensorSampling((6, 6), 2e-3, 4.0))).plan()
     needed = called_by(lambda: run(plan, Fidelity(10, aligned=False)), monkeypatch)
     known = {name.rpartition(".")[2] for name in needed}
-    assert {"convolve", "relaxed", "_dual_newton", "_conjugate_gradients", "_extrapolate_traction"} <= known
+    assert {"convolve", "relaxed", "nearest_tractions", "_rounds", "_extrapolate_traction"} <= known
     assert needed <= called_by(load_kernels.__wrapped__, monkeypatch)
