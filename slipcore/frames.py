@@ -1,5 +1,6 @@
 """Grasp logs: tactile frames over time, as they enter slipcore (stage 1: frames)."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
@@ -430,12 +431,14 @@ def _check_pose(pose: FloatArray | None) -> None:
 def _check_normal(normal: FloatArray | None) -> None:
     if normal is None:
         return
-    length = np.linalg.norm(normal, axis=-1)
-    worst = float(length.flat[int(np.argmax(np.abs(length - 1.0)))])
+    square = np.einsum("...k,...k", normal, normal)
+    shortest, longest = math.sqrt(square.min()), math.sqrt(square.max())
+    worst = longest if longest - 1.0 > 1.0 - shortest else shortest
     if abs(worst - 1.0) > LIMITS.normal_length:
         raise InvalidInput("normal", f"of length {worst:.6g}", f"unit vectors, to {LIMITS.normal_length:g}")
-    if not (normal[..., 2] > 0.0).all():
-        raise InvalidInput("normal", f"z component {normal[..., 2].min():.3g}", "outward, z component above 0")
+    least = float(normal[..., 2].min())
+    if not least > 0.0:
+        raise InvalidInput("normal", f"z component {least:.3g}", "outward, z component above 0")
 
 
 def _check_gripper_force(force: FloatArray | None) -> None:

@@ -10,14 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg.blas import ddot
 
 from slipcore.defaults import DEFAULT_METHOD, LIMITS, ContactOptions, choose_options
 from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.contact import ContactThreshold
-from slipcore.detection.shared.decision import apply_decision
+from slipcore.detection.shared.decision import decide_frame
 from slipcore.detection.shared.interface import CompiledMethod, ObservedFrame, Start
 from slipcore.detection.shared.lasting_noise import start_noise
-from slipcore.detection.shared.observe import observe
+from slipcore.detection.shared.observe import observe_frame
 from slipcore.detection.shared.records import (
     NO_FIELD,
     NO_MASK,
@@ -26,7 +27,9 @@ from slipcore.detection.shared.records import (
     FrameArrays,
     Memory,
     empty_like,
+    plain,
     read_only,
+    shared_workspace,
     unwritten,
     workspace,
 )
@@ -135,13 +138,14 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     seen = frame_arrays(frame._replace(displacement=displacement, force=force))
     method, memory = find_method(setup.method), state.memory
     sensor, after, of_method = setup.sensor, empty_like(memory), None
-    velocity = np.empty((*memory.probability.shape, 2))
+    shape = memory.probability.shape
+    velocity = np.empty((*shape, 2))
+    given: list[Any] = [tuple(part) for part in (sensor, last, seen, memory, after)]  # numba is slow at named tuples
     if isinstance(method, CompiledMethod):
-        arguments = sensor, last, seen, memory, after
-        noise, touching, slipping = method.run(*map(tuple, arguments), velocity)  # numba is slow at named tuples
+        noise, touching, slipping = method.run(*given, shared_workspace(*shape), velocity)
     else:
-        room = workspace(*memory.probability.shape)
-        observe(sensor, last, seen, memory, after, room, True)
+        room = workspace(*shape)
+        observe_frame(*[*given, plain(room)])
         noise, pressing_noise = (float(known) for known in room.surface.noise[:2])
         observation = ObservedFrame(
             seen.time - last.time,
@@ -153,7 +157,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
             pressing_noise,
         )
         of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
-        touching, slipping = apply_decision(sensor.position, last, seen, decision, memory, after, room.weight, velocity)
+        touching, slipping = decide_frame(*[*given, plain(room._replace(decision=decision)), velocity])
     now = slip_state(frame.time, after, velocity, touching, slipping)
     return DetectorState(setup, seen, frame.observed, after, of_method, noise), masked(
         now, frame.observed, state.observed
@@ -275,9 +279,7 @@ def _field(name: str, value: ArrayLike, shape: tuple[int, ...], limit: float, un
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
         copy = value.copy()
         flat = copy.ravel()
-        with np.errstate(over="ignore"):
-            square = flat @ flat
-        if square <= limit * limit:  # none is larger, nor infinite or NaN
+        if ddot(flat, flat) <= limit * limit:  # none is larger, nor infinite or NaN; numpy would warn of these
             copy.flags.writeable = False
             return copy
     return check_frame(name, value, shape, limit, unit)

@@ -67,8 +67,8 @@ def fold(
     for k in range(1, frames):
         last, frame = frame_at(log, k - 1), frame_at(log, k)
         before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
-        given, velocity = (sensor, last, frame, before, after), results.velocity[k]
-        found = filter_frame(*given, room, velocity) if is_filter else run_strain_rate(*given, velocity)
+        given = sensor, last, frame, before, after, room, results.velocity[k]
+        found = filter_frame(*given) if is_filter else run_strain_rate(*given)
         sigma, results.touching[k], results.slipping[k] = found
         if 0 < lookahead < k:
             revise(sensor, log, rings, k - lookahead, k, room, results)

@@ -4,8 +4,9 @@ from inspect import unwrap
 
 import numpy as np
 import pytest
+from scipy.special import log_ndtr
 
-from slipcore.elementary import exponentials, logarithms, probabilities_of_hazards
+from slipcore.elementary import exponentials, logarithms, logarithms_of_normal_cdf, probabilities_of_hazards
 
 EXPONENTS = np.concatenate([np.linspace(-708.0, 709.0, 200_003), np.linspace(-1.0, 1.0, 20_001), [0.0, 1e-300, -1e-17]])
 HAZARDS = np.concatenate([np.geomspace(1e-300, 700.0, 200_003), np.linspace(0.0, 2.0, 20_001)])
@@ -38,7 +39,12 @@ def test_logarithms_are_those_of_the_c_library_to_two_units() -> None:
     assert of(logarithms, np.ones(1)) == 0.0
 
 
-@pytest.mark.parametrize("function", [exponentials, probabilities_of_hazards, logarithms])
+def test_logarithms_of_the_normal_distribution_are_those_of_scipy() -> None:
+    z = np.concatenate([np.linspace(0.0, 10.0, 200_003), np.geomspace(10.0, 1e40, 1001)])
+    np.testing.assert_allclose(of(logarithms_of_normal_cdf, z), log_ndtr(z), rtol=0.0, atol=5e-16)
+
+
+@pytest.mark.parametrize("function", [exponentials, probabilities_of_hazards, logarithms, logarithms_of_normal_cdf])
 def test_a_number_is_the_same_wherever_it_stands(function: object) -> None:
     """In the vectors of a long loop and in what is left over at its end."""
     values = np.linspace(0.1, 3.0, 37)

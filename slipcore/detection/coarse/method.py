@@ -34,6 +34,7 @@ from slipcore.detection.shared.records import (
     Memory,
     empty_like,
     read_only,
+    shared_workspace,
     unwritten,
 )
 from slipcore.finding import Finding
@@ -74,9 +75,10 @@ def step(
         read_only(seen.contact.copy()),
     )
     after = empty_like(state.memory)
-    velocity = np.empty((*seen.contact.shape, 2))
-    arguments = _sensor(lattice, options), last, frame, state.memory, after
-    by_place.METHOD.run(*map(tuple, arguments), velocity)  # as in ``detector.step``, lest another kernel is compiled
+    shape = seen.contact.shape
+    velocity = np.empty((*shape, 2))
+    arguments = *map(tuple, (_sensor(lattice, options), last, frame, state.memory, after)), shared_workspace(*shape)
+    by_place.METHOD.run(*arguments, velocity)  # as in ``detector.step``, lest another kernel is compiled
     doubted = after.common[DOUBTED_FRAMES] > state.memory.common[DOUBTED_FRAMES]
     if doubted or not seen.force.size:
         least = expit(-options.largest_sum)

@@ -1,6 +1,7 @@
 """Log-odds of slip from f_t/f_n of an element, without a friction coefficient given."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,40 +11,57 @@ from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.filter.state import FRICTION, NORMAL, OPPOSED, PROBABILITY, RATIO, RATIO_WEIGHT, TANGENTIAL
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import Surface
+from slipcore.elementary import logarithms, logarithms_of_normal_cdf
 from slipcore.frames import FloatArray
 
 HALF_LOG_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 
-@compiled
-def log_normal_cdf(z: float) -> float:
-    """log Φ(z), with the asymptote far out."""
-    if z > 3.0:
-        return -0.5 * math.erfc(z / math.sqrt(2.0))
-    if z > -8.0:
-        return math.log(0.5 * math.erfc(-z / math.sqrt(2.0)))
-    return -0.5 * z * z - math.log(-z) - HALF_LOG_TWO_PI
+class ToldByForces(NamedTuple):
+    """What the forces on elements tell of slip, [k] each: its ``log_odds``, and what they are found from: the force
+    ``ratio`` and its ``variance``; the weighted sum of ratios at which the element was ``seen`` to slip, and its
+    ``weight``.
+    """
+
+    log_odds: FloatArray
+    variance: FloatArray
+    ratio: FloatArray
+    seen: FloatArray
+    weight: FloatArray
 
 
-@compiled
-def ratio_log_odds(
+@compiled(inline=True)
+def below_limit(
     ratio: float, noise: float, own: float, known: float, friction: float, gain: float, tuning: Tuning
-) -> float:
-    """Log-likelihood ratio of slip at a force ratio: near the one it slips at, against anywhere below it.
+) -> tuple[float, float]:
+    """How many deviations a force ratio is below the one that slips, 0 above it, and how many deviations that is.
 
     ``noise``: variance of the ratio; ``own`` over ``known``: the ratio at which this element was seen to slip;
-    ``friction``: that of all; ``gain``: share of what is learnt that a frame replaces. In slip the ratio is normal
-    about the limit λ with deviation s, in stick uniform below λ and as blurred: log(λ/s) + log φ(z) − log Φ(z) with
-    z = (λ − ratio)/s, and constant above λ.
+    ``friction``: that of all; ``gain``: share of what is learnt that a frame replaces.
     """
     prior = 2.0 * gain / (tuning.ratio_difference * friction) ** 2
     limit = (prior * friction + own) / (prior + known)
     deviation = math.sqrt(noise + (tuning.ratio_spread * friction) ** 2 + 0.5 * gain / (prior + known))
-    z = (limit - ratio) / deviation
-    best = math.log(limit / deviation) - HALF_LOG_TWO_PI
-    if z < 0.0:
-        return best + math.log(2.0)
-    return best - 0.5 * z * z - log_normal_cdf(z)
+    return max((limit - ratio) / deviation, 0.0), limit / deviation
+
+
+@compiled(inline=True)
+def find_ratio_log_odds(told: ToldByForces, friction: float, gain: float, tuning: Tuning) -> None:
+    """Fill the log-likelihood ratio of slip at a force ratio: near the one it slips at, against anywhere below it; the
+    other rows of what is ``told`` are used up.
+
+    In slip the ratio is normal about the limit λ with deviation s, in stick uniform below λ and as blurred: log(λ/s) +
+    log φ(z) − log Φ(z) with z = (λ − ratio)/s, and constant above λ.
+    """
+    log_odds, below, log_cdf = told.log_odds, told.ratio, told.seen
+    for e in range(len(log_odds)):
+        given = told.ratio[e], told.variance[e], told.seen[e], told.weight[e]
+        below[e], log_odds[e] = below_limit(*given, friction, gain, tuning)
+        log_cdf[e] = below[e]
+    logarithms(log_odds)
+    logarithms_of_normal_cdf(log_cdf)
+    for e in range(len(log_odds)):
+        log_odds[e] -= HALF_LOG_TWO_PI + 0.5 * below[e] * below[e] + log_cdf[e]
 
 
 @compiled
@@ -69,76 +87,74 @@ def weigh_forces(
     tuning: Tuning,
     after: FloatArray,
     common: FloatArray,
-    told: FloatArray,
+    told: ToldByForces,
 ) -> None:
-    """Learn the force ratio at which elements slip, each its own and the mean of all; fill ``told`` [2, k] by the
-    log-odds of slip of each and the variance of its ratio.
+    """Learn the force ratio at which elements slip, each its own and the mean of all; fill what is ``told`` of each.
 
     ``noise`` of an element's normal force, N. Of an element whose force opposes the motion the ratio is that of stick.
     """
-    log_odds, variance = told
-    told[:] = 0.0
     gain, memory = low_pass(interval, tuning.force_smoothing), -math.expm1(-interval / tuning.ratio_memory)
     left = gain / (2.0 - gain)
     least = max(tuning.force_to_noise * noise * math.sqrt(left), tuning.ratio_least_force)
-    for e in range(len(places)):
-        i, j = places[e]
-        normal = after[NORMAL, i, j]
-        if normal > least:
-            ratio = after[TANGENTIAL, i, j] / normal
-            variance[e] = noise * noise * left * (1.0 + ratio * ratio) / (normal * normal)
-    learn_ratios(elements, places, variance, least, memory, tuning, after, common)
-    if not common[FRICTION + 1] > 0.0:
+    total, weights = learn_ratios(elements, places, noise * noise * left, least, memory, tuning, after, told)
+    common[FRICTION] += memory * (total - common[FRICTION])
+    common[FRICTION + 1] += memory * (weights - common[FRICTION + 1])
+    friction = common[FRICTION] / common[FRICTION + 1] if common[FRICTION + 1] > 0.0 else 0.0
+    if not friction > 0.0:
+        told.log_odds[:] = 0.0
         return
-    friction = common[FRICTION] / common[FRICTION + 1]
+    find_ratio_log_odds(told, friction, memory, tuning)
+    weight, most = tuning.ratio_weight * gain, tuning.ratio_limit
     for e in range(len(places)):
         i, j = places[e]
-        if friction > 0.0 and after[NORMAL, i, j] > least:
-            ratio = 0.0 if after[OPPOSED, i, j] else after[TANGENTIAL, i, j] / after[NORMAL, i, j]
-            own, known = after[RATIO, i, j], after[RATIO_WEIGHT, i, j]
-            gained = ratio_log_odds(ratio, variance[e], own, known, friction, memory, tuning)
-            limited = min(max(gained, -tuning.ratio_limit), tuning.ratio_limit)
-            log_odds[e] = limited * tuning.ratio_weight * gain
+        counts = after[NORMAL, i, j] > least
+        told.log_odds[e] = weight * min(max(told.log_odds[e], -most), most) if counts else 0.0
 
 
 @compiled
-def keep_ratios(elements: FloatArray, places: NDArray[np.int64], after: FloatArray, told: FloatArray) -> None:
-    """Learn nothing, and fill ``told`` [2, k] with nothing: for frames in which nothing happens."""
-    told[:] = 0.0
+def keep_ratios(elements: FloatArray, places: NDArray[np.int64], after: FloatArray, log_odds: FloatArray) -> None:
+    """Learn nothing, and tell nothing by ``log_odds`` [k]: for frames in which nothing happens."""
+    log_odds[:] = 0.0
     for e in range(len(places)):
         i, j = places[e]
         after[RATIO, i, j], after[RATIO_WEIGHT, i, j] = elements[RATIO, i, j], elements[RATIO_WEIGHT, i, j]
 
 
-@compiled
+@compiled(inline=True)
 def learn_ratios(
     elements: FloatArray,
     places: NDArray[np.int64],
-    variance: FloatArray,
+    noise: float,
     least: float,
     memory: float,
     tuning: Tuning,
     after: FloatArray,
-    common: FloatArray,
-) -> None:
-    """Forget by ``memory`` and add the force ratios of what most likely slips, of given ``variance`` [k].
+    told: ToldByForces,
+) -> tuple[float, float]:
+    """Forget by ``memory`` and add the force ratios of what most likely slips; fill in what is ``told`` the variances
+    of ratios, the ratios themselves, and those seen to slip. The weighted sum of all that slip, and its weight.
 
-    Only where the normal force is above ``least`` N, and the object's force does not oppose its motion.
+    Only where the normal force is above ``least`` N, and the object's force does not oppose its motion. ``noise``:
+    variance of a force, N².
     """
-    total = weight = 0.0
+    total = weights = 0.0
     for e in range(len(places)):
         i, j = places[e]
-        p, normal = elements[PROBABILITY, i, j], after[NORMAL, i, j]
-        own = ratio = 0.0
-        if normal > least and not after[OPPOSED, i, j]:
-            ratio = after[TANGENTIAL, i, j] / normal
-            if p > tuning.ratio_slip:
-                w = p * p / (variance[e] + tuning.ratio_variance)
+        p, normal, tangential = elements[PROBABILITY, i, j], after[NORMAL, i, j], after[TANGENTIAL, i, j]
+        own = ratio = variance = 0.0
+        if normal > least:
+            ratio = tangential / normal
+            variance = noise * (1.0 + ratio * ratio) / (normal * normal)
+            opposed = after[OPPOSED, i, j] > 0.0
+            ratio = 0.0 if opposed else ratio
+            if p > tuning.ratio_slip and not opposed:
+                w = p * p / (variance + tuning.ratio_variance)
                 total += w * ratio
-                weight += w
-            if p > tuning.ratio_slip_of_element:
-                own = memory / (variance[e] + tuning.ratio_variance_of_element)
-        after[RATIO, i, j] = (1.0 - memory) * elements[RATIO, i, j] + own * ratio
-        after[RATIO_WEIGHT, i, j] = (1.0 - memory) * elements[RATIO_WEIGHT, i, j] + own
-    common[FRICTION] += memory * (total - common[FRICTION])
-    common[FRICTION + 1] += memory * (weight - common[FRICTION + 1])
+                weights += w
+            if p > tuning.ratio_slip_of_element and not opposed:
+                own = memory / (variance + tuning.ratio_variance_of_element)
+        seen = (1.0 - memory) * elements[RATIO, i, j] + own * ratio
+        weight = (1.0 - memory) * elements[RATIO_WEIGHT, i, j] + own
+        after[RATIO, i, j], after[RATIO_WEIGHT, i, j] = seen, weight
+        told.ratio[e], told.variance[e], told.seen[e], told.weight[e] = ratio, variance, seen, weight
+    return total, weights

@@ -30,7 +30,7 @@ def low_pass(interval: float, time_constant: float) -> float:
     return -math.expm1(-interval / time_constant) if time_constant > 0.0 else 1.0
 
 
-@compiled
+@compiled(fastmath={"reassoc"})
 def step_loading(
     loading: Loading,
     places: tuple[FloatArray, FloatArray],
@@ -41,25 +41,27 @@ def step_loading(
     gain: float,
 ) -> Loading:
     """Rates of the load on the elements [k] in contact now and before, at x, y m, the object moved under each by
-    x, y m, each ``deeper`` by m, and by change of ``force`` [3, k] N (empty if there is none).
+    x, y m, each ``deeper`` by m, and by change of ``force`` [3, k or more] N (empty if there is none).
     """
     x, y = places
     count = len(x)
     if count == 0:
         return Loading(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    cx, cy = x.mean(), y.mean()
-    moved = moment = lever = 0.0
+    cx = cy = depth = 0.0
+    for e in range(count):
+        cx, cy, depth = cx + x[e], cy + y[e], depth + deeper[e]
+    cx, cy, depth = cx / count, cy / count, depth / count
+    moved = lever = moment = force_x = force_y = normal = 0.0
     for e in range(count):
         moved += motion.x[e] ** 2 + motion.y[e] ** 2
         lever += (x[e] - cx) ** 2 + (y[e] - cy) ** 2
-        if force.size:
-            moment += (x[e] - cx) * force[1, e] - (y[e] - cy) * force[0, e]
-    force_x = force_y = normal = 0.0
     if force.size:
-        force_x, force_y, normal = force[0].sum(), force[1].sum(), -force[2].sum()
+        for e in range(count):
+            force_x, force_y, normal = force_x + force[0, e], force_y + force[1, e], normal - force[2, e]
+            moment += (x[e] - cx) * force[1, e] - (y[e] - cy) * force[0, e]
     twist = moment / max(math.sqrt(lever / count), _LEAST_LEVER)
     return Loading(
-        loading.depth + gain * (deeper.mean() / interval - loading.depth),
+        loading.depth + gain * (depth / interval - loading.depth),
         loading.motion + gain * (math.sqrt(moved / count) / interval - loading.motion),
         loading.normal + gain * (normal / interval - loading.normal),
         loading.force_x + gain * (force_x / interval - loading.force_x),

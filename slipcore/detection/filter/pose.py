@@ -83,7 +83,7 @@ def place_of_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
     return cosine * x - sine * y + pose.x, sine * x + cosine * y + pose.y
 
 
-@compiled
+@compiled(fastmath={"reassoc"})
 def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[Pose, PoseVariance]:
     """Weighted Procrustes fit of the pose that carries each anchor to its marker, and its variance.
 

@@ -7,20 +7,24 @@ from slipcore.detection.filter.step import lasting_noise, step_filter
 from slipcore.detection.filter.tuning import tuning_of
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace, named, workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace, named
 from slipcore.frames import FloatArray
 
 
 @compiled
 def run_filter(
-    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, velocity: FloatArray
+    sensor: DetectorSetup,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: Memory,
+    after: Memory,
+    room: Workspace,
+    velocity: FloatArray,
 ) -> tuple[float, int, int]:
     """Fill the memory ``after`` and ``velocity``; marker noise, m (NaN if unknown), and how many elements touch and
     slip. What it is given may be plain tuples of the same entries.
     """
-    sensor, last, frame, before, after = named(sensor, last, frame, before, after)
-    n, m = after.probability.shape
-    return filter_frame(sensor, last, frame, before, after, workspace(n, m), velocity)
+    return filter_frame(*named(sensor, last, frame, before, after, room), velocity)
 
 
 @compiled(inline=True)
@@ -33,7 +37,7 @@ def filter_frame(
     room: Workspace,
     velocity: FloatArray,
 ) -> tuple[float, int, int]:
-    """The same in a ``room`` that is there already."""
+    """The same of what has names."""
     has_force = observe(sensor, last, frame, before, after, room, False)
     step_filter(sensor, last, frame, before, after, room, has_force)
     touching, slipping = apply_decision(

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.element import Increment, Measurements, update_elements
-from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
+from slipcore.detection.filter.element import Estimates, Increment, Measurements, update_elements
+from slipcore.detection.filter.force_ratio import ToldByForces, follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
@@ -88,31 +88,30 @@ def step_elements(
     noise = frame.time - last.time, variance, force_noise
     lasting = tell_noise(room.surface, tuning, common)
     places = room.places[: find_places(elements, stays, room.places)]
-    anchors, motion, deeper, change, told, seen = rooms_of(room.rows, len(places))
+    anchors, motion, deeper, change, told, seen, states = rooms_of(room.rows, len(places))
     shift = shift_of_surroundings(last, frame, before.contact, after.contact, room.weight, room.rows, tuning, common)
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)
     move_anchors(anchors, pose, spread, held, tuning, motion, common)
-    if not (has_force and last.force.size):
-        change = change[:, :0]
+    compared = has_force and last.force.size > 0 and len(places) > 0
+    change = change if compared else change[:0]
     force_change(places, last.force, frame.force, change)
     indentation_change(places, last.displacement, frame.displacement, deeper)
     restick = restick_under_load(before.common, common, anchors, motion, deeper, change, noise, tuning) and not held
     gain = low_pass(noise[0], tuning.force_smoothing)
     follow_forces(elements, room.surface, has_force, gain, after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, after.elements)
-    look_at_forces(elements, places, change.size > 0, held, noise, tuning, told, after)
+    look_at_forces(elements, places, compared, held, noise, tuning, told, after)
     start_elements(position, frame.displacement, shift, stays, pose, variance, after)
     begins = not (restick or math.isnan(room.surface.noise[0]))  # slip does not before noise is known
-    find_readiness(elements, after.contact, places, begins, tuning, seen.readiness)
+    find_readiness(elements, after.contact, places, begins, tuning, room.weight, seen.readiness)
     # Neighbours blur where slip begins; only what no force shows is worth that.
     pooled = not has_force and common[RESOLUTION] == 0.0 and lasting > 0.0
     beside = lasting * lasting / (lasting * lasting + tuning.pooling_length**2) if pooled else 0.0
     look_at_markers(anchors, pose, places, room.offsets, 4.0 * tuning.pooling_outlier * variance, beside, seen)
-    update_elements(
-        elements, after.elements, places, motion, seen, Increment(noise[0], variance, restick, held), tuning
-    )
+    increment = Increment(noise[0], variance, restick, held)
+    update_elements(elements, after.elements, places, motion, seen, states, increment, tuning)
     sight = last.displacement, frame.displacement, after.contact, stays
     measured = has_force and tuning.force_floor == 0.0  # what is reconstructed from markers says no more than they do
     rooms, noise_now = (room.rows, room.series), (math.sqrt(variance), held, measured)  # anchors are done with
@@ -156,20 +155,20 @@ def look_at_forces(
     held: bool,
     noise: tuple[float, float, float],
     tuning: Tuning,
-    told: FloatArray,
+    told: ToldByForces,
     after: Memory,
 ) -> None:
-    """Fill ``told`` [2, k] with the log-odds of slip that forces tell, where they can be ``compared`` with the last.
+    """Fill ``told`` with the log-odds of slip that forces tell, where they can be ``compared`` with the last.
 
     ``noise``: interval s, variance of a marker coordinate m², and deviation of an element's force N.
     """
     interval, _, force_noise = noise
     if held:
-        keep_ratios(elements, places, after.elements, told)
+        keep_ratios(elements, places, after.elements, told.log_odds)
     elif compared:
         weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
     else:
-        told[:] = 0.0
+        told.log_odds[:] = 0.0
 
 
 @compiled
@@ -179,13 +178,22 @@ def find_readiness(
     places: NDArray[np.int64],
     begins: bool,
     tuning: Tuning,
+    slip: FloatArray,
     readiness: FloatArray,
 ) -> None:
-    """Fill how readily slip begins at these places, by how many neighbours slip; 0 unless it ``begins``."""
+    """Fill how readily slip begins at these places, by how many neighbours slip; 0 unless it ``begins``. ``slip``
+    [n, m]: room.
+    """
+    if not begins:
+        readiness[:] = 0.0
+        return
+    n, m = contact.shape
+    for i in range(n):
+        for j in range(m):
+            slip[i, j] = elements[PROBABILITY, i, j] if contact[i, j] else 1.0
     for e in range(len(places)):
         i, j = places[e]
-        near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, contact, i, j)
-        readiness[e] = near if begins else 0.0
+        readiness[e] = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(slip, i, j)
 
 
 @compiled
@@ -244,24 +252,31 @@ def known_or(noise: float, otherwise: float) -> float:
     return otherwise if math.isnan(noise) else noise
 
 
-@compiled
+@compiled(inline=True)
 def rooms_of(
     rows: FloatArray, count: int
-) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, FloatArray, Measurements]:
+) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, ToldByForces, Measurements, Estimates]:
     """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
-    change of force [3, k], the evidence of these [2, k], and what the step brings.
+    change of force [3, n·m], what forces tell, what the step brings, and both states.
+
+    What is needed later stands in place of what is done with: the fewer rows, the more of them stay near.
     """
     anchors = Anchors(
         rows[0][:count], rows[1][:count], rows[2][:count], rows[3][:count],
         rows[4][:count], rows[5][:count], rows[6][:count], rows[7][:count],
     )  # fmt: skip
     motion = AnchorMotion(rows[8][:count], rows[9][:count], rows[10][:count])
-    # stick and weights of anchors, and change of force, are done with once the load has been looked at
+    told = ToldByForces(rows[15][:count], rows[16][:count], rows[12][:count], rows[13][:count], rows[14][:count])
+    # stick and weights of anchors are done with once the load has been looked at, their markers once places are known
     seen = Measurements(
         rows[5][:count], rows[6][:count], rows[7][:count], rows[11][:count],
         rows[15][:count], rows[12][:count], rows[13][:count], rows[14][:count],
     )  # fmt: skip
-    return anchors, motion, rows[11][:count], rows[12:15, :count], rows[15:17, :count], seen
+    states = Estimates(
+        rows[17][:count], rows[0][:count], rows[1][:count], rows[2][:count],
+        rows[3][:count], rows[4][:count], rows[16][:count],
+    )  # fmt: skip
+    return anchors, motion, rows[11][:count], rows[12:15], told, seen, states
 
 
 @compiled
@@ -306,11 +321,14 @@ def indentation_change(places: NDArray[np.int64], start: FloatArray, end: FloatA
 
 @compiled
 def force_change(places: NDArray[np.int64], before: FloatArray, now: FloatArray, change: FloatArray) -> None:
-    """Fill the change of force [3, k] N at these places; ``change`` is empty where a force is missing."""
-    for e in range(change.shape[1]):
+    """Fill the change of force [3, k or more] N at these places; ``change`` is empty where a force is missing."""
+    if change.size == 0:
+        return
+    for e in range(len(places)):
         i, j = places[e]
-        for a in range(3):
-            change[a, e] = now[i, j, a] - before[i, j, a]
+        change[0, e] = now[i, j, 0] - before[i, j, 0]
+        change[1, e] = now[i, j, 1] - before[i, j, 1]
+        change[2, e] = now[i, j, 2] - before[i, j, 2]
 
 
 @compiled(inline=True)
@@ -325,11 +343,11 @@ def start_elements(
 ) -> None:
     """Elements that have just touched stick where they are; of those that do not touch nothing is known."""
     contact, after = memory.contact, memory.elements
-    after[STICK_X : SLIP_VARIANCE + 1] = 0.0
     n, m = contact.shape
     for i in range(n):
         for j in range(m):
             if not stays[i, j]:
+                after[STICK_X, i, j] = after[STICK_Y, i, j] = after[SLIP_X, i, j] = after[SLIP_Y, i, j] = 0.0
                 after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = np.inf
                 after[PROBABILITY, i, j] = after[ONSET, i, j] = 0.0
                 after[END, i, j] = 1.0
@@ -342,14 +360,13 @@ def start_elements(
 
 
 @compiled
-def slip_of_neighbours(elements: FloatArray, contact: BoolArray, i: int, j: int) -> float:
-    """Mean slip probability of the four neighbours; beyond the contact's edge everything slips."""
-    n, m = contact.shape
-    total = 0.0
-    total += elements[PROBABILITY, i - 1, j] if i > 0 and contact[i - 1, j] else 1.0
-    total += elements[PROBABILITY, i + 1, j] if i < n - 1 and contact[i + 1, j] else 1.0
-    total += elements[PROBABILITY, i, j - 1] if j > 0 and contact[i, j - 1] else 1.0
-    total += elements[PROBABILITY, i, j + 1] if j < m - 1 and contact[i, j + 1] else 1.0
+def slip_of_neighbours(slip: FloatArray, i: int, j: int) -> float:
+    """Mean probability of ``slip`` [n, m] of the four neighbours; beyond the lattice everything slips."""
+    n, m = slip.shape
+    total = slip[i - 1, j] if i > 0 else 1.0
+    total += slip[i + 1, j] if i < n - 1 else 1.0
+    total += slip[i, j - 1] if j > 0 else 1.0
+    total += slip[i, j + 1] if j < m - 1 else 1.0
     return 0.25 * total
 
 

@@ -64,29 +64,36 @@ def distance_from(was: BoolArray, contact: BoolArray, distance: FloatArray) -> i
     most.
     """
     n, m = contact.shape
-    aslant, touching = math.sqrt(2.0), 0
+    touching = 0
     for i in range(n):
         for j in range(m):
-            if contact[i, j] or was[i, j]:
-                distance[i, j] = 0.0
-                touching += 1
-                continue
-            least = distance[i, j - 1] + 1.0 if j > 0 else math.inf
-            if i > 0:
-                least = min(least, distance[i - 1, j] + 1.0)
-                least = min(least, distance[i - 1, j - 1] + aslant) if j > 0 else least
-                least = min(least, distance[i - 1, j + 1] + aslant) if j < m - 1 else least
-            distance[i, j] = least
-    for i in range(n - 1, -1, -1):
-        for j in range(m - 1, -1, -1):
-            least = distance[i, j]
-            least = min(least, distance[i, j + 1] + 1.0) if j < m - 1 else least
-            if i < n - 1:
-                least = min(least, distance[i + 1, j] + 1.0)
-                least = min(least, distance[i + 1, j - 1] + aslant) if j > 0 else least
-                least = min(least, distance[i + 1, j + 1] + aslant) if j < m - 1 else least
-            distance[i, j] = least
+            touches = contact[i, j] or was[i, j]
+            distance[i, j] = 0.0 if touches else math.inf
+            touching += touches
+    if 0 < touching < n * m:
+        for i in range(n):
+            spread_across(distance[max(i - 1, 0)], distance[i])
+            for j in range(1, m):
+                distance[i, j] = min(distance[i, j], distance[i, j - 1] + 1.0)
+        for i in range(n - 1, -1, -1):
+            spread_across(distance[min(i + 1, n - 1)], distance[i])
+            for j in range(m - 2, -1, -1):
+                distance[i, j] = min(distance[i, j], distance[i, j + 1] + 1.0)
     return touching
+
+
+@compiled
+def spread_across(beside: FloatArray, row: FloatArray) -> None:
+    """Bring distances in a ``row`` [m] down to those by way of the one ``beside`` it, straight or aslant; its own are
+    never nearer by way of themselves.
+    """
+    m, aslant = len(row), math.sqrt(2.0)
+    for j in range(m):
+        row[j] = min(row[j], beside[j] + 1.0)
+    for j in range(1, m):
+        row[j] = min(row[j], beside[j - 1] + aslant)
+    for j in range(m - 1):
+        row[j] = min(row[j], beside[j + 1] + aslant)
 
 
 @compiled

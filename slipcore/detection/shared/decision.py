@@ -3,9 +3,24 @@
 import math
 
 from slipcore.compilation import compiled
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory
+from slipcore.detection.shared.records import Decision, DetectorSetup, FrameArrays, Memory, Workspace, named
 from slipcore.detection.shared.rigid_motion import RigidMotion, fit_motion
 from slipcore.frames import FloatArray
+
+
+@compiled
+def decide_frame(
+    sensor: DetectorSetup,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: Memory,
+    after: Memory,
+    room: Workspace,
+    velocity: FloatArray,
+) -> tuple[int, int]:
+    """``apply_decision`` of that in the ``room``; what it is given may be plain tuples of the same entries."""
+    sensor, last, frame, before, after, room = named(sensor, last, frame, before, after, room)
+    return apply_decision(sensor.position, last, frame, room.decision, before, after, room.weight, velocity)
 
 
 @compiled(inline=True)

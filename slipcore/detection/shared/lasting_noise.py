@@ -66,15 +66,13 @@ def noise_between_neighbours(displacement: FloatArray, values: FloatArray) -> fl
 def size_of(displacement: FloatArray) -> float:
     """Root mean square of a component of displacement [n, m, 3] about its mean, m; of evenly chosen elements."""
     n, m, _ = displacement.shape
-    count, total = min(n * m, SERIES), 0.0
-    for a in range(3):
-        first = second = 0.0
-        for s in range(count):
-            i, j = divmod(s * n * m // count, m)
-            value = displacement[i, j, a]
-            first += value
-            second += value * value
-        total += max(second - first * first / count, 0.0)
+    count, place = min(n * m, SERIES), displacement.reshape(n * m, 3)
+    x = y = z = xx = yy = zz = 0.0
+    for s in range(count):
+        e = s * n * m // count
+        x, y, z = x + place[e, 0], y + place[e, 1], z + place[e, 2]
+        xx, yy, zz = xx + place[e, 0] ** 2, yy + place[e, 1] ** 2, zz + place[e, 2] ** 2
+    total = max(xx - x * x / count, 0.0) + max(yy - y * y / count, 0.0) + max(zz - z * z / count, 0.0)
     return math.sqrt(total / (3 * count))
 
 
@@ -93,13 +91,13 @@ def seek_steps(displacement: FloatArray, found: FloatArray, series: FloatArray) 
     """Keep in ``found`` what ``seek_step`` does of places in the plane, and then of depth; evenly chosen elements."""
     n, m, _ = displacement.shape
     count = min(n * m, SERIES)
+    place = displacement.reshape(n * m, 3)
     for s in range(count):
-        i, j = divmod(s * n * m // count, m)
-        series[0, s], series[1, s] = displacement[i, j, 0], displacement[i, j, 1]
+        e = s * n * m // count
+        series[0, s], series[1, s] = place[e, 0], place[e, 1]
     seek_step(series[:, :count], found[:2])
     for s in range(count):
-        i, j = divmod(s * n * m // count, m)
-        series[0, s] = displacement[i, j, 2]
+        series[0, s] = place[s * n * m // count, 2]
     seek_step(series[:1, :count], found[2:4])
 
 

@@ -6,7 +6,7 @@ from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE, SMOOTHING
 from slipcore.detection.shared.contact import TOUCH, ContactThreshold, find_contact, spatial_noise
 from slipcore.detection.shared.lasting_noise import OF_STEP, step_lasting
-from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace, named
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
 from slipcore.surface.normals import split_forces, surface_normals
@@ -17,6 +17,15 @@ SERIES, _STALE, _MOVED, _LEAST_NOISE = (
     NOISE.stale_deviations,
     SMOOTHING.least_force_noise,
 )
+
+
+@compiled
+def observe_frame(
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
+) -> bool:
+    """``observe`` with normals; what it is given may be plain tuples of the same entries."""
+    sensor, last, frame, before, after, room = named(sensor, last, frame, before, after, room)
+    return observe(sensor, last, frame, before, after, room, True)
 
 
 @compiled(inline=True)
@@ -144,9 +153,10 @@ def step_noise(
     after[:3] = noise[:3]
     after[3:6] = noise[6:9]
     first, middle, last = noise[3:6, :k], noise[6:9, :k], after[6:9, :k]
+    place, depth = displacement.reshape(n * m, 3), pressing.reshape(n * m)
     for s in range(k):
-        i, j = divmod(s * n * m // k, m)
-        last[0, s], last[1, s], last[2, s] = displacement[i, j, 0], displacement[i, j, 1], pressing[i, j]
+        e = s * n * m // k
+        last[0, s], last[1, s], last[2, s] = place[e, 0], place[e, 1], depth[e]
     clock = noise[2]
     if clock[2] >= 1.0 and same(middle, last):
         after[3:6] = noise[3:6]

@@ -1,6 +1,7 @@
 """What compiled steps take and fill, as named tuples of plain arrays; a field that a frame does not have is empty."""
 
-from typing import NamedTuple, TypeVar
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from slipcore.defaults import NOISE
 from slipcore.frames import BoolArray, FloatArray
 
 Scalar = TypeVar("Scalar", bound=np.generic)
-_SERIES, _ROWS = max(NOISE.series, NOISE.memory), 17
+_SERIES, _ROWS = max(NOISE.series, NOISE.memory), 18
 
 
 def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
@@ -70,6 +71,8 @@ class Memory(NamedTuple):
 
 def unwritten(frame: FrameArrays) -> FrameArrays:
     """The same frame: unpickled arrays can be written to, and kernels are compiled for one type."""
+    if not frame.displacement.flags.writeable:
+        return frame
     return FrameArrays(
         frame.time,
         read_only(frame.displacement),
@@ -113,12 +116,14 @@ class Decision(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that a step fills on its way, the same for every frame of a log; nothing in them outlasts a frame.
+    """Arrays that a step fills on its way; nothing in them outlasts a frame.
 
     An array that is allocated for a frame costs more than what is done to it where elements are few, and the counting
     of references to all others in the same function as much again: numba only leaves that out where it frees nothing.
+    Where elements are many, fresh memory is worse still: on 200 × 200 the operating system took longer to hand out 10
+    MB for each frame than the step took.
     ``weight`` [n, m]: how surely each element sticks before and after. ``series`` [2, k]: values to take medians of.
-    Of the elements that a method looks at one by one: their ``places`` [n·m, 2] and ``rows`` [17, n·m] of numbers, and
+    Of the elements that a method looks at one by one: their ``places`` [n·m, 2] and ``rows`` [18, n·m] of numbers, and
     how far their markers are from their anchors, ``offsets`` [2, n, m] m.
     """
 
@@ -131,27 +136,35 @@ class Workspace(NamedTuple):
     offsets: FloatArray
 
 
-@compiled
 def workspace(n: int, m: int) -> Workspace:
     """Room for frames of n × m elements."""
-    stays, slip, shape = np.empty((n, m), np.bool_), np.empty((n, m), np.bool_), (n, m)
-    surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), stays, np.empty(4))
-    decision, series = Decision(slip, np.empty(shape)), np.empty((2, _SERIES))
-    return Workspace(
-        surface,
-        decision,
-        np.empty(shape),
-        series,
-        np.empty((n * m, 2), np.int64),
-        np.empty((_ROWS, n * m)),
-        np.empty((2, n, m)),
-    )
+    shape = n, m
+    surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), np.empty(shape, bool), np.empty(4))
+    decision, series = Decision(np.empty(shape, bool), np.empty(shape)), np.empty((2, _SERIES))
+    places, rows = np.empty((n * m, 2), np.int64), np.empty((_ROWS, n * m))
+    return Workspace(surface, decision, np.empty(shape), series, places, rows, np.empty((2, n, m)))
+
+
+def plain(room: Workspace) -> tuple[Any, ...]:
+    """The same as plain tuples."""
+    return tuple(tuple(part) if isinstance(part, tuple) else part for part in room)
+
+
+@lru_cache(maxsize=2)
+def shared_workspace(n: int, m: int) -> tuple[Any, ...]:
+    """Room as plain tuples for steps that are one compiled call, the same for all detectors: such a call keeps the
+    interpreter's lock, so that no two of them are in it at once.
+    """
+    return plain(workspace(n, m))
 
 
 @compiled
 def named(
-    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory
-) -> tuple[DetectorSetup, FrameArrays, FrameArrays, Memory, Memory]:
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
+) -> tuple[DetectorSetup, FrameArrays, FrameArrays, Memory, Memory, Workspace]:
     """The same with names: from Python, plain tuples reach a kernel four times as fast as named ones."""
     frames = FrameArrays(*borrowed(last)), FrameArrays(*borrowed(frame))
-    return DetectorSetup(*borrowed(sensor)), *frames, Memory(*borrowed(before)), Memory(*borrowed(after))
+    memories = Memory(*borrowed(before)), Memory(*borrowed(after))
+    surface, decision, weight, series, places, rows, offsets = borrowed(room)
+    made = Workspace(Surface(*surface), Decision(*decision), weight, series, places, rows, offsets)
+    return DetectorSetup(*borrowed(sensor)), *frames, *memories, made

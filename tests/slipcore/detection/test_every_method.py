@@ -14,6 +14,7 @@ from slipcore import (
     InvalidInput,
     SlipDetector,
     SlipHistory,
+    SlipState,
     collect_history,
     describe_options,
     detect_slip,
@@ -294,3 +295,17 @@ def changed(log: GraspLog, change: str) -> tuple[GraspLog, Callable[[np.ndarray]
 def arranged(log: GraspLog, arrange: Callable[[np.ndarray], np.ndarray]) -> GraspLog:
     fields = {name: getattr(log, name) for name in ("position", "displacement", "force", "normal")}
     return replace(log, **{name: arrange(field) for name, field in fields.items() if field is not None})
+
+
+@EACH_METHOD
+def test_streams_of_one_lattice_that_take_turns_are_those_of_each_alone(short_ramp: GraspLog, method: str) -> None:
+    logs = [replace(short_ramp, truth=None, displacement=share * short_ramp.displacement) for share in (1.0, 0.5)]
+    detectors = [SlipDetector(log.position, log.element_area, method) for log in logs]
+    found: list[list[SlipState]] = [[], []]
+    for frames in zip(*(log.frames() for log in logs), strict=True):
+        for detector, frame, states in zip(detectors, frames, found, strict=True):
+            states.append(detector.step(*frame))
+    for log, states in zip(logs, found, strict=True):
+        alone = stream(log, method)
+        np.testing.assert_array_equal([state.probability for state in states], alone.probability)
+        np.testing.assert_array_equal([state.velocity for state in states], alone.velocity)

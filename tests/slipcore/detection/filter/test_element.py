@@ -63,10 +63,12 @@ def test_two_estimates_are_mixed_by_their_moments() -> None:
     assert mixed.variance == pytest.approx(0.75 * 0.1 + 0.25 * 0.5 + between + 0.03)
 
 
-@pytest.mark.parametrize(("trust", "x", "y", "variance"), [(1.0, 1.75, 5.0, 0.75), (0.0, 1.0, 2.0, 3.0)])
+@pytest.mark.parametrize(
+    ("trust", "spread", "x", "y", "variance"), [(1.0, 0.0, 1.75, 5.0, 0.75), (0.0, 0.1, 1.0, 2.0, 3.0 + 0.1 * 17.0)]
+)
 def test_a_prediction_is_corrected_by_its_share_of_the_variance(
-    trust: float, x: float, y: float, variance: float
+    trust: float, spread: float, x: float, y: float, variance: float
 ) -> None:
-    """Variances of 3 and 1: three quarters of the way, and a quarter of the variance is left."""
-    found = unwrap(correct)(PlaceEstimate(1.0, 2.0, 3.0), 2.0, 6.0, 1.0, trust)
+    """Variances of 3 and 1: three quarters of the way, and a quarter of the variance is left; or it is only wider."""
+    found = unwrap(correct)(PlaceEstimate(1.0, 2.0, 3.0), 2.0, 6.0, 1.0, trust, spread)
     np.testing.assert_allclose(found, (x, y, variance))

@@ -3,13 +3,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import log_ndtr
 
-from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
+from slipcore import FilterOptions, GraspLog, SlipDetector, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter import state
-from slipcore.detection.filter.element import Increment, Measurements, update_elements
-from slipcore.detection.filter.force_ratio import log_normal_cdf, ratio_log_odds
+from slipcore.detection.filter.element import Estimates, Increment, Measurements, update_elements
+from slipcore.detection.filter.force_ratio import ToldByForces, find_ratio_log_odds
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, find_pose, place_of_object, place_on_object, pose_at
 from slipcore.detection.filter.tuning import Tuning, settings_of
 
@@ -75,15 +74,11 @@ def test_a_fitted_pose_is_the_motion_of_what_sticks_though_a_third_slips() -> No
     assert variance.place > 0.0
 
 
-def test_the_log_of_the_normal_distribution_holds_far_out() -> None:
-    z = np.array([-40.0, -8.5, -7.5, -1.0, 0.0, 3.0])
-    found = [log_normal_cdf(value) for value in z]
-    np.testing.assert_allclose(found, log_ndtr(z), rtol=3e-3, atol=1e-12)  # the asymptote errs by 1/z² at −8
-
-
 def test_evidence_of_a_force_ratio_rises_to_the_one_that_slips() -> None:
     tuning = TUNING._replace(ratio_spread=0.1, ratio_difference=0.15)
-    evidence = [ratio_log_odds(r, 1e-4, 0.0, 0.0, 0.4, 0.03, tuning) for r in (0.1, 0.25, 0.4, 0.5)]
+    told = ToldByForces(np.empty(4), np.full(4, 1e-4), np.array([0.1, 0.25, 0.4, 0.5]), np.zeros(4), np.zeros(4))
+    find_ratio_log_odds(told, 0.4, 0.03, tuning)
+    evidence = told.log_odds
     assert evidence[0] < evidence[1] < 0.0 < evidence[2] <= evidence[3]
 
 
@@ -96,7 +91,7 @@ def updated(p: float, motion: float, share: float, restick: bool) -> float:
     x, readiness, room = np.array([-share * motion]), np.array([0.04 if restick else 2.0]), np.zeros((5, 1))
     seen = Measurements(x, room[0], np.ones(1), readiness, *room[1:])
     place, increment = np.zeros((1, 2), np.int64), Increment(1.0 / 30.0, 1e-12, restick, False)
-    update_elements(old, new, place, moved, seen, increment, TUNING)
+    update_elements(old, new, place, moved, seen, Estimates(*np.empty((7, 1))), increment, TUNING)
     return float(new[state.PROBABILITY, 0, 0])
 
 
@@ -113,3 +108,18 @@ def test_what_comes_along_sticks_and_what_stays_behind_slips() -> None:
 def test_restick_under_load_ends_slip_without_motion() -> None:
     for restick, least, most in ((False, 0.95, 1.0), (True, 0.0, 0.1)):
         assert least <= updated(0.99, 0.0, 0.0, restick) <= most
+
+
+def test_what_is_known_of_friction_stays_while_nothing_touches() -> None:
+    log = tangential_ramp(points=8, pitch=1.5e-3, schedule=RampSchedule(0.1, 0.3, 0.1, 1.5, 0.1), marker_noise=1e-6)
+    detector = SlipDetector(log.position, log.element_area)
+    for frame in log.frames():
+        detector.step(frame.time, frame.displacement, frame.force)
+    noise, nothing = np.random.default_rng(0), np.zeros((*log.grid, 3))
+    friction = []
+    for k in range(4):
+        rest = 1e-6 * noise.standard_normal(nothing.shape)
+        assert not detector.step(log.time[-1] + 0.1 * (k + 1), rest, nothing).contact.any()
+        friction.append(detector.state.memory.common[state.FRICTION : state.FRICTION + 2].tolist())
+    assert friction[0][1] > 0.0
+    assert friction[1:] == friction[:-1]

@@ -96,12 +96,28 @@ def test_places_are_those_that_stay_and_have_a_state_row_by_row() -> None:
 
 
 def test_rows_are_shared_out_to_as_many_anchors() -> None:
-    rows = np.arange(17.0)[:, None] + 0.1 * np.arange(4)
-    anchors, motion, deeper, change, told, seen = unwrap(rooms_of)(rows, 3)
+    rows = np.arange(18.0)[:, None] + 0.1 * np.arange(4)
+    anchors, motion, deeper, change, told, seen, states = unwrap(rooms_of)(rows, 3)
     assert [each[1] for each in anchors] == pytest.approx([0.1, 1.1, 2.1, 3.1, 4.1, 5.1, 6.1, 7.1])
     assert [each[0] for each in motion] == [8.0, 9.0, 10.0]
-    assert (deeper[2], change.shape, change[0, 0], told.shape, told[0, 0]) == (11.2, (3, 3), 12.0, (2, 3), 15.0)
+    assert (deeper[2], len(deeper), change.shape, change[0, 0]) == (11.2, 3, (3, 4), 12.0)
+    assert [each[0] for each in told] == [15.0, 16.0, 12.0, 13.0, 14.0]
     assert [each[0] for each in seen] == [5.0, 6.0, 7.0, 11.0, 15.0, 12.0, 13.0, 14.0]
+    assert [each[0] for each in states] == [17.0, 0.0, 1.0, 2.0, 3.0, 4.0, 16.0]
+
+
+def test_what_is_used_at_a_time_shares_no_rows() -> None:
+    """The fit of the pose beside the change of force, the evidence of forces, and the states beside what is seen."""
+    rows = np.arange(18.0)[:, None] + np.zeros(2)
+    anchors, motion, deeper, change, told, seen, states = unwrap(rooms_of)(rows, 2)
+    markers = anchors.x, anchors.y, anchors.marker_x, anchors.marker_y, seen.x, seen.y, seen.share
+    for together in (
+        (*anchors, *motion, deeper, *change),
+        (*anchors[:5], *motion, *told),
+        (*markers, *motion, seen.readiness, seen.by_force),
+        (*seen, *states, *motion),
+    ):
+        assert len({float(row[0]) for row in together}) == len(together)
 
 
 def test_an_anchor_is_where_an_element_would_be_if_it_stuck_and_where_its_marker_is() -> None:
@@ -121,6 +137,7 @@ def test_changes_are_deeper_inwards_and_of_force_forwards() -> None:
     assert deeper.tolist() == [-10.0, -34.0]
     unwrap(force_change)(places, FIELD, 3.0 * FIELD, change)
     assert change.T.tolist() == [[6.0, 8.0, 10.0], [30.0, 32.0, 34.0]]
+    unwrap(force_change)(places, FIELD, 3.0 * FIELD, change[:0])  # no forces: nothing to fill
 
 
 def test_what_has_just_touched_sticks_where_it_is_and_of_what_does_not_nothing_is_known() -> None:
@@ -133,23 +150,20 @@ def test_what_has_just_touched_sticks_where_it_is_and_of_what_does_not_nothing_i
     found = after.elements
     for x, y in ((STICK_X, STICK_Y), (SLIP_X, SLIP_Y)):
         assert (found[x, 0, 1], found[y, 0, 1]) == (pytest.approx(44.0 - 1.0), pytest.approx(-(33.0 - 0.5 - 1.0)))
+        assert (found[x, 0, 2], found[y, 0, 2]) == (0.0, 0.0)
     for variance in (STICK_VARIANCE, SLIP_VARIANCE):
-        assert found[variance, 0].tolist() == [0.0, 9.0, math.inf]
+        assert found[variance, 0].tolist() == [0.7, 9.0, math.inf]
     assert found[END, 0].tolist() == [0.7, 1.0, 1.0]
     assert found[PROBABILITY, 0].tolist() == found[ONSET, 0].tolist() == [0.7, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
     ("place", "mean"),
-    [((1, 1), 0.25 * (0.1 + 0.7 + 0.3 + 1.0)), ((0, 0), 0.25 * (1.0 + 0.3 + 1.0 + 0.1)), ((2, 2), 1.0)],
+    [((1, 1), 0.25 * (0.1 + 0.7 + 0.3 + 0.8)), ((0, 0), 0.25 * (1.0 + 0.3 + 1.0 + 0.1)), ((2, 2), 0.25 * 3.5)],
 )
-def test_beyond_contact_and_lattice_all_neighbours_slip(place: tuple[int, int], mean: float) -> None:
-    elements, contact = np.zeros((ROWS, 3, 3)), np.ones((3, 3), bool)
-    elements[PROBABILITY] = [[0.5, 0.1, 0.9], [0.3, 0.6, 0.8], [0.2, 0.7, 0.4]]
-    contact[1, 2] = contact[2, 2] = False
-    if place == (2, 2):
-        contact[2, 1] = False
-    assert unwrap(slip_of_neighbours)(elements, contact, *place) == pytest.approx(mean)
+def test_beyond_the_lattice_all_neighbours_slip(place: tuple[int, int], mean: float) -> None:
+    slip = np.array([[0.5, 0.1, 0.9], [0.3, 0.6, 0.8], [0.2, 0.7, 0.4]])
+    assert unwrap(slip_of_neighbours)(slip, *place) == pytest.approx(mean)
 
 
 def test_slip_is_told_above_the_threshold_with_even_odds_there() -> None:
@@ -172,10 +186,12 @@ def test_log_odds_that_are_expected_add_to_those_of_the_posterior() -> None:
 def test_slip_begins_as_readily_as_neighbours_slip_or_not_at_all() -> None:
     elements, contact, found = np.zeros((ROWS, 3, 3)), np.ones((3, 3), bool), np.zeros(2)
     elements[PROBABILITY, 0, 1] = 0.8
+    contact[2, 2] = False  # beyond the contact everything slips
     tuning, places = TUNING._replace(onset_inside=0.1, onset_at_front=2.0), np.array([[1, 1], [2, 1]])
-    unwrap(find_readiness)(elements, contact, places, True, tuning, found)
-    np.testing.assert_allclose(found, [0.1 + 2.0 * 0.2, 0.1 + 2.0 * 0.25], rtol=1e-15)
-    unwrap(find_readiness)(elements, contact, places, False, tuning, found)
+    room = np.empty((3, 3))
+    unwrap(find_readiness)(elements, contact, places, True, tuning, room, found)
+    np.testing.assert_allclose(found, [0.1 + 2.0 * 0.2, 0.1 + 2.0 * 0.5], rtol=1e-15)
+    unwrap(find_readiness)(elements, contact, places, False, tuning, room, found)
     assert not found.any()
 
 
