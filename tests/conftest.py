@@ -8,11 +8,14 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import hypothesis
+import numpy as np
 import pytest
 import uvicorn
 from sqlalchemy import Dialect
@@ -28,6 +31,8 @@ from db import migrate
 from db.database import Database
 from db.records import Claim
 from db.repositories import jobs, runners
+from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
+from slipcore.contact.tiers import ramp
 from tests import prompt_ends
 from tests.migrations import Remembered
 
@@ -42,6 +47,9 @@ GARBAGE = (10_000, 20, 50)
 """After so many new objects, collections and older ones garbage is collected: half of the 4 % of the time that it takes
 at Python's 700, 10 and 10.
 """
+
+RAMP_FRAMES = 2000
+"""Kept in a process, of 10 to 30 kB each."""
 
 FOLDERS = 4 * 2**30
 """Bytes in memory that must be free for the tests' folders: a whole run writes 2 GB and keeps those of failed tests."""
@@ -114,6 +122,31 @@ def statements_compiled_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(ClauseElement, "_compile_w_cache", compile_once)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def certificates_read_once() -> Iterator[None]:
+    """Each client of httpx reads all that are trusted, 20 ms, and none here asks for an https address."""
+    with pytest.MonkeyPatch.context() as patched:
+        create = "httpx._transports.default.create_ssl_context"
+        patched.setattr(create, cache(httpx.create_ssl_context))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ramps_computed_once() -> Iterator[None]:
+    """The same few ramps are seen by many tests, with another noise each: their frames in closed form are kept."""
+    fields, frames = ramp._fields, LRUCache[Any, ramp._Fields](RAMP_FRAMES)
+
+    def compute_once(load: CattaneoMindlin, position: np.ndarray, element_area: float) -> ramp._Fields:
+        key = (load, position.shape, position.tobytes(), element_area)
+        if key not in frames:
+            frames[key] = fields(load, position, element_area)
+        return frames[key]
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(ramp, "_fields", compute_once)
         yield
 
 

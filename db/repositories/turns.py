@@ -8,7 +8,8 @@ A second turn orders the jobs of one key in the same way by material and size. T
 the second which of theirs.
 """
 
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, false, func, select, update
 from sqlalchemy.orm import InstrumentedAttribute, Session
@@ -19,16 +20,32 @@ STEP, LONG_STEP = 2, 20
 """Turns from one job to the next, after a short and for a long one."""
 
 Turn = InstrumentedAttribute[int]
+Conditions = tuple[ColumnElement[bool], ...]
+
+
+class _Line(NamedTuple):
+    """Jobs that take ``turn``s among the ``whole`` of them, and the ``group`` of these that one more comes into."""
+
+    turn: Any
+    whole: Conditions
+    group: Conditions
+
+
+class _Extreme(NamedTuple):
+    """The least or the largest turn, ``wanted``, ``among`` jobs of a ``status``."""
+
+    wanted: Any
+    status: str
+    among: Conditions
 
 
 def new(session: Session, key_id: str | None, material_id: int | None, *, is_long: bool) -> dict[str, int]:
     """The turns of a job that comes into the queue, by column."""
     of_key = JobRow.requested_by == key_id
     of_group = (of_key, JobRow.material_id == material_id, JobRow.is_long == is_long)
-    return {
-        "turn": _after(session, JobRow.turn, (), (of_key,), is_long=is_long),
-        "turn_within_key": _after(session, JobRow.turn_within_key, (of_key,), of_group, is_long=is_long),
-    }
+    lines = _Line(JobRow.turn, (), (of_key,)), _Line(JobRow.turn_within_key, (of_key,), of_group)
+    turn, turn_within_key = _after(session, lines, is_long=is_long)
+    return {"turn": turn, "turn_within_key": turn_within_key}
 
 
 def first(session: Session, *among: ColumnElement[bool]) -> tuple[str, int] | None:
@@ -45,41 +62,45 @@ def first(session: Session, *among: ColumnElement[bool]) -> tuple[str, int] | No
     return str(chosen.id), int(head.turn)
 
 
-def _after(
-    session: Session,
-    turn: Turn,
-    whole: tuple[ColumnElement[bool], ...],
-    group: tuple[ColumnElement[bool], ...],
-    *,
-    is_long: bool,
-) -> int:
-    """A step after the last of the group; a group that has nobody comes before the second of the others."""
-    served = _served(session, turn, whole)
-    if not is_long:  # short jobs may be served before long ones of an earlier turn
-        served = max(served, _served(session, turn, (*whole, JobRow.is_long == false())))
-    ends = [_extreme(session, func.max(turn), status, group) for status in ("queued", "running")]
-    last = max((end for end in ends if end is not None), default=None)
-    step = LONG_STEP if is_long else STEP
-    return served + step - 1 if last is None else max(last, served) + step
+def _after(session: Session, lines: Sequence[_Line], *, is_long: bool) -> list[int]:
+    """In each line a step after the last of the group; one that has nobody comes before the second of the others."""
+    sizes: list[Conditions] = [()] if is_long else [(), (JobRow.is_long == false(),)]
+    parts = [(line.turn, (*line.whole, *size)) for line in lines for size in sizes]  # short jobs may be served early
+    heads = [_Extreme(func.min(turn), "queued", among) for turn, among in parts]
+    ends = [_Extreme(func.max(line.turn), each, line.group) for line in lines for each in ("queued", "running")]
+    found = _extremes(session, *heads, *ends)
+    served, last = list(_served(session, parts, found[: len(parts)])), found[len(parts) :]
+    step, after = LONG_STEP if is_long else STEP, []
+    for k in range(len(lines)):
+        now = max(served[k * len(sizes) : (k + 1) * len(sizes)])
+        known = [end for end in last[2 * k : 2 * k + 2] if end is not None]
+        after.append(max(now, *known) + step if known else now + step - 1)
+    return after
 
 
-def _served(session: Session, turn: Turn, among: tuple[ColumnElement[bool], ...]) -> int:
-    """The turn that is served now among some jobs: that of the last one that runs and is not before its turn.
+def _served(session: Session, parts: Sequence[tuple[Any, Conditions]], heads: Sequence[int | None]) -> Iterator[int]:
+    """The turns that are served now among some jobs, whose queued ones begin with the ``heads``: that of the last one
+    that runs and is not before its turn.
 
     A job that takes long may have begun in a turn long past: the next one's is at most a long step away.
     """
-    head = _extreme(session, func.min(turn), "queued", among)
-    in_turn = () if head is None else (turn <= head,)
-    served = _extreme(session, func.max(turn), "running", (*among, *in_turn))
-    if head is None:
-        return served or 0
-    if served is None:
-        return head - STEP + 1  # who comes now comes with the head, which is older
-    return max(served, head - LONG_STEP)
+    running = [
+        _Extreme(func.max(turn), "running", among if head is None else (*among, turn <= head))
+        for (turn, among), head in zip(parts, heads, strict=True)
+    ]
+    for head, served in zip(heads, _extremes(session, *running), strict=True):
+        if head is None:
+            yield served or 0
+        elif served is None:
+            yield head - STEP + 1  # who comes now comes with the head, which is older
+        else:
+            yield max(served, head - LONG_STEP)
 
 
-def _extreme(session: Session, wanted: Any, status: str, among: tuple[ColumnElement[bool], ...]) -> int | None:
-    return session.scalar(select(wanted).where(JobRow.status == status, *among))
+def _extremes(session: Session, *asked: _Extreme) -> list[int | None]:
+    """All by one statement, each of which is a look into an index."""
+    each = [select(one.wanted).where(JobRow.status == one.status, *one.among).scalar_subquery() for one in asked]
+    return list(session.execute(select(*each)).one())
 
 
 def _least(session: Session, turn: Turn, among: tuple[ColumnElement[bool], ...]) -> Any:
