@@ -1,4 +1,4 @@
-"""Eight numbers at a time, in compiled code.
+"""Eight numbers at a time, in compiled code, of double or single precision.
 
 ``load(array, index)`` takes eight numbers of a flat array, ``store`` puts them back; sums, differences and products are
 of each of the eight with each of eight others, or with one number. The compiler always turns them into the machine's
@@ -19,23 +19,26 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
 COUNT = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), COUNT)
-_ANY = ir.Constant(_VECTOR, ir.Undefined)
+_VECTORS = {
+    types.float64: ir.VectorType(ir.DoubleType(), COUNT),
+    types.float32: ir.VectorType(ir.FloatType(), COUNT),
+}
 _OPERATIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
 
 
 class _LanesType(types.Type):  # type: ignore[misc]
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
+    def __init__(self, number: Any) -> None:
+        self.number = number
+        super().__init__(name=f"Lanes({number})")
 
 
 @register_default(_LanesType)
 class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, kind: _LanesType) -> None:
-        super().__init__(manager, kind, _VECTOR)
+        super().__init__(manager, kind, _VECTORS[kind.number])
 
 
-_LANES = _LanesType()
+_LANES = {number: _LanesType(number) for number in _VECTORS}
 
 
 def _permuted(builder: Any, first: Any, second: Any, order: list[int]) -> Any:
@@ -45,18 +48,22 @@ def _permuted(builder: Any, first: Any, second: Any, order: list[int]) -> Any:
 
 def _operation(function: Callable[..., Any], name: str) -> None:
     """Compile an operator for two vectors, and for a vector and one number."""
-    cases = [signature(_LANES, _LANES, other) for other in (_LANES, types.float64)]
+    cases = [signature(lanes, lanes, other) for lanes in _LANES.values() for other in (lanes, types.float64)]
     infer_global(function)(type(f"Lanes{name}", (ConcreteTemplate,), {"cases": cases}))
 
     def of_two(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return getattr(builder, name)(*arguments, flags=("contract",))
 
     def of_one(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
-        lane = builder.insert_element(_ANY, arguments[1], ir.Constant(ir.IntType(32), 0))
-        return of_two(context, builder, kinds, (arguments[0], _permuted(builder, lane, _ANY, [0] * COUNT)))
+        vector = _VECTORS[kinds.args[0].number]
+        number = context.cast(builder, arguments[1], types.float64, kinds.args[0].number)
+        anything = ir.Constant(vector, ir.Undefined)
+        lane = builder.insert_element(anything, number, ir.Constant(ir.IntType(32), 0))
+        return of_two(context, builder, kinds, (arguments[0], _permuted(builder, lane, anything, [0] * COUNT)))
 
-    lower_builtin(function, _LANES, _LANES)(of_two)
-    lower_builtin(function, _LANES, types.float64)(of_one)
+    for lanes in _LANES.values():
+        lower_builtin(function, lanes, lanes)(of_two)
+        lower_builtin(function, lanes, types.float64)(of_one)
 
 
 for _function, _name in _OPERATIONS.items():
@@ -64,13 +71,13 @@ for _function, _name in _OPERATIONS.items():
 
 
 def _check(array: Any) -> None:
-    if not isinstance(array, types.Array) or (array.dtype, array.ndim, array.layout) != (types.float64, 1, "C"):
-        raise TypingError(f"lanes of {array}; allowed: a contiguous array [n] of float64")
+    if not isinstance(array, types.Array) or (array.ndim, array.layout) != (1, "C") or array.dtype not in _VECTORS:
+        raise TypingError(f"lanes of {array}; allowed: a contiguous array [n] of float64 or float32")
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
     first = builder.gep(make_array(kind)(context, builder, array).data, [index])
-    return builder.bitcast(first, _VECTOR.as_pointer())
+    return builder.bitcast(first, _VECTORS[kind.dtype].as_pointer())
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -80,9 +87,9 @@ def load(_typing: Any, array: Any, _index: Any) -> Any:
     _check(array)
 
     def read(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
-        return builder.load(_place(context, builder, kinds.args[0], *arguments), align=8)
+        return builder.load(_place(context, builder, kinds.args[0], *arguments), align=4)
 
-    return _LANES(array, types.intp), read
+    return _LANES[array.dtype](array, types.intp), read
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -92,10 +99,10 @@ def store(_typing: Any, array: Any, _index: Any, _lanes: Any) -> Any:
     _check(array)
 
     def write(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
-        builder.store(arguments[2], _place(context, builder, kinds.args[0], *arguments[:2]), align=8)
+        builder.store(arguments[2], _place(context, builder, kinds.args[0], *arguments[:2]), align=4)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, _LANES), write
+    return types.void(array, types.intp, _LANES[array.dtype]), write
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -110,7 +117,7 @@ def transpose(_typing: Any, array: Any, _index: Any) -> Any:
     def exchange(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
         first = _place(context, builder, kinds.args[0], *arguments)
         places = [builder.gep(first, [ir.Constant(ir.IntType(64), row)]) for row in range(COUNT)]
-        rows = [builder.load(place, align=8) for place in places]
+        rows = [builder.load(place, align=4) for place in places]
         for size in (1, 2, 4):
             kept = [lane if not lane & size else lane + COUNT - size for lane in range(COUNT)]
             moved = [lane + size if not lane & size else lane + COUNT for lane in range(COUNT)]
@@ -118,7 +125,7 @@ def transpose(_typing: Any, array: Any, _index: Any) -> Any:
                 pair = rows[row], rows[row + size]
                 rows[row], rows[row + size] = (_permuted(builder, *pair, order) for order in (kept, moved))
         for row, place in zip(rows, places, strict=True):
-            builder.store(row, place, align=8)
+            builder.store(row, place, align=4)
         return context.get_dummy_value()
 
     return types.void(array, types.intp), exchange

@@ -2,10 +2,10 @@
 
 Medians of processor time (one thread, so that other programs matter little) over warm-started load steps of the
 paper's Condition 1 (sphere of 15 mm, F_N = 10 N, F_T to 3.96 N in 50 steps), at residuals of 1e-4 and 1e-8 of the
-largest limit; beside each its floor, the number of convolutions times the cost of one, both measured, what the
-preconditioner takes likewise, and Newton's rounds. Then normal contact from nothing, coupled steps, the steps of few
-cells that audits of control take, whole scenes, and the memory of 1024 × 1024 cells. Writes contact_speed.json and
-prints a Markdown table. `--parts` measures only some of that.
+largest limit; beside each its floor, the number of convolutions times the cost of one, those in double and in single
+precision each by its own, all measured; what the preconditioner takes likewise, and Newton's rounds. Then normal
+contact from nothing, coupled steps, the steps of few cells that audits of control take, whole scenes, and the memory of
+1024 × 1024 cells. Writes contact_speed.json and prints a Markdown table. `--parts` measures only some of that.
 """
 
 import argparse
@@ -24,6 +24,7 @@ from slipcore.contact.defaults import FIDELITY
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.elasticity.operator import Count, ElasticOperator, Operators
+from slipcore.contact.elasticity.transform import convolve
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.problem import ContactProblem, StepLoad
@@ -97,13 +98,20 @@ def median_time(call: Callable[[], object], repeats: int = 9) -> float:
     return 1e3 * float(np.median(seconds))
 
 
-def convolution(cells: int, poisson: float) -> tuple[float, float]:
-    """Milliseconds of one tangential application, two components to two, and of its preconditioner."""
+def convolution(cells: int, poisson: float) -> tuple[float, float, float]:
+    """Milliseconds of one tangential application, two components to two, of one in single precision, and of its
+    preconditioner.
+    """
     grid = Grid.square(cells, width(poisson))
     operator = ElasticOperator((HalfSpace.from_young(YOUNG, poisson),), grid)
     traction = np.random.default_rng(0).standard_normal((2, *grid.shape))
-    inverse = operator.tangential_inverse
-    return median_time(lambda: operator.tangential(traction), 25), median_time(lambda: inverse(traction), 25)
+    field, result = traction.astype(np.float32), np.empty(traction.shape, dtype=np.float32)
+    single, inverse = operator.tangential_single, operator.tangential_inverse.single
+    return (
+        median_time(lambda: operator.tangential(traction), 25),
+        median_time(lambda: convolve(field, result, single), 25),
+        median_time(lambda: convolve(field, result, inverse), 25),
+    )
 
 
 def applications(count: Count) -> float:
@@ -115,14 +123,17 @@ def step_cost(what: str, cells: int, residual: float, target: float | None, pois
     """Median cost of a warm-started step."""
     results = [r for _ in range(3) for r in shear_steps(cells, residual, poisson, coupled)]
     needed = float(np.median([applications(r.applications) for r in results]))
-    one, inverse = convolution(cells, poisson)
+    one, single, inverse = convolution(cells, poisson)
+    floors = [
+        one * (applications(r.applications) - r.applications.single) + single * r.applications.single for r in results
+    ]
     rounds = float(np.mean([r.iterations for r in results]))
     inverted = float(np.mean([r.applications.inverse for r in results]))
     return Cost(
         what,
         1e3 * float(np.median([r.seconds for r in results])),
         target,
-        needed * one,
+        float(np.median(floors)),
         needed,
         max(r.residual for r in results),
         len(results),

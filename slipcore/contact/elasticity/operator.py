@@ -13,11 +13,14 @@ from slipcore.frames import FloatArray
 
 @dataclass(slots=True)
 class Count:
-    """How often the operators of one problem were applied, and the approximate ``inverse`` of the tangential one."""
+    """How often the operators of one problem were applied, how many of the tangential ones in ``single`` precision, and
+    the approximate ``inverse`` of the tangential one, always in single precision.
+    """
 
     normal: int = 0
     tangential: int = 0
     coupling: int = 0
+    single: int = 0
     inverse: int = 0
 
     def since(self, earlier: "Count") -> "Count":
@@ -40,6 +43,7 @@ class ElasticOperator:
         "_normal_inverse",
         "_tangential",
         "_tangential_inverse",
+        "_tangential_single",
         "bodies",
         "convolution",
         "count",
@@ -60,6 +64,7 @@ class ElasticOperator:
         self._kernels: dict[Component, FloatArray | None] = {}
         self._normal: FloatArray | None = None
         self._tangential: FloatArray | None = None
+        self._tangential_single: Compiled | None = None
         self._coupling: FloatArray | None = None
         self._coarse: ElasticOperator | None = None
         self._normal_inverse: NormalInverse | None = None
@@ -90,6 +95,14 @@ class ElasticOperator:
     def tangential_compiled(self) -> Compiled:
         """``tangential`` for compiled code, which does not count itself."""
         return self.convolution.by(self._along())
+
+    @property
+    def tangential_single(self) -> Compiled:
+        """``tangential`` for compiled code in single precision, in units of ``xx`` of a cell on itself."""
+        if self._tangential_single is None:
+            own = self._nonzero("xx", self.grid)[0, 0]
+            self._tangential_single = self.convolution.by((self._along() / own).astype(np.float32))
+        return self._tangential_single
 
     def _along(self) -> FloatArray:
         if self._tangential is None:

@@ -49,9 +49,12 @@ class NormalInverse:
 
 
 class TangentialInverse:
-    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; influences as above."""
+    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; influences as above.
 
-    __slots__ = ("_convolution", "_inverse")
+    ``single``: the same for compiled code in single precision, of displacements in units of ``xx`` of a cell on itself.
+    """
+
+    __slots__ = ("_convolution", "_inverse", "single")
 
     def __init__(self, shape: tuple[int, int], xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
         self._convolution = Convolution(shape, xx.shape)
@@ -59,12 +62,8 @@ class TangentialInverse:
         b = np.zeros_like(a) if xy is None else circulant_spectrum(xy, odd=True)
         determinant = a * d - b * b
         self._inverse = symbols([[d / determinant, -b / determinant], [-b / determinant, a / determinant]])
+        self.single: Compiled = self._convolution.by((self._inverse * xx[0, 0]).astype(np.float32))
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
         return self._convolution(displacement, self._inverse)
-
-    @property
-    def compiled(self) -> Compiled:
-        """The same for compiled code."""
-        return self._convolution.by(self._inverse)

@@ -4,14 +4,20 @@ A cell slides if a gradient step from it leaves its disk; it may move along its 
 
 Loops over cells are compiled, without branches so that they run in vectors, and fused: at 64² cells a call of numpy
 costs as much as its arithmetic. Fields in them are flat, of n cells.
+
+Conjugate gradients run in single precision, in units of a cell's own compliance and of the largest slip that is left:
+they go to a share of that alone, and each Newton step finds anew what is left, in double precision.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.contact.defaults import TANGENTIAL
 from slipcore.contact.elasticity.fields import VECTOR, largest
-from slipcore.contact.elasticity.transform import Compiled, convolve
+from slipcore.contact.elasticity.transform import Compiled, Numbers, convolve
 from slipcore.frames import BoolArray, FloatArray
 
 Space = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -20,7 +26,13 @@ the rigid motions in the space, curvature [n] of the limits (a sliding cell's sl
 """
 FIELDS = 7
 """What ``survey`` fills: the projector (3), what first moves sliding cells onto their circles (2), curvature, scale."""
+SingleArray = NDArray[np.float32]
+SingleSpace = tuple[SingleArray, SingleArray, SingleArray, SingleArray, SingleArray]
+"""The same in single precision, with the curvature in units of a cell's own compliance."""
 _CIRCLE_ROUNDING, _RANK = TANGENTIAL.circle_rounding, TANGENTIAL.rank
+Taken = tuple[int, int, int]
+"""How often the operator was applied, how often in single precision, and how often its inverse."""
+_STIFFEST = float(np.finfo(np.float32).eps) ** -2  # no scale is smaller than single precision shows beside one
 
 
 @compiled
@@ -137,9 +149,10 @@ def _subtract_rigid(projector: FloatArray, arm: FloatArray, motion: FloatArray, 
 
 
 @compiled
-def _rigid(inverse_gram: FloatArray, sums: tuple[float, float, float]) -> FloatArray:
+def _rigid(inverse_gram: Numbers, sums: tuple[Any, Any, Any]) -> Numbers:
     """The rigid motion [3] whose part in the space has these resultants."""
-    return inverse_gram[:, 0] * sums[0] + inverse_gram[:, 1] * sums[1] + inverse_gram[:, 2] * sums[2]
+    motion: Numbers = inverse_gram[:, 0] * sums[0] + inverse_gram[:, 1] * sums[1] + inverse_gram[:, 2] * sums[2]
+    return motion
 
 
 @compiled
@@ -147,29 +160,72 @@ def newton_move(
     space: Space,
     fields: tuple[FloatArray, FloatArray, FloatArray],
     target: FloatArray,
-    by: tuple[Compiled, Compiled],
-    bounds: tuple[float, float, int],
-) -> tuple[FloatArray, int, int]:
+    by: tuple[Compiled, Compiled, Compiled],
+    bounds: tuple[float, float, float, int],
+) -> tuple[FloatArray, Taken]:
     """The move [2, ny, nx] onto the limits and to the resultants ``target`` [3], and from there to where the tangential
-    part of the slip is zero; how often it took the operator, and the preconditioner.
+    part of the slip is zero; and what it took.
 
     Solves P(C + curvature)P move = −P(slip + curvature·made), with ``made`` the first part, by preconditioned conjugate
-    gradients. ``fields`` [2, ny, nx]: traction, slip and what leads onto the circles; ``by``: operator and
-    preconditioner; ``bounds``: a first part that is none, reduction of the preconditioned residual, most iterations.
+    gradients. ``fields`` [2, ny, nx]: traction, slip and what leads onto the circles; ``by``: operator, the same in
+    single precision, and preconditioner; ``bounds``: a cell's own stiffness, a first part that is none, reduction of
+    the preconditioned residual, most iterations.
     """
-    (projector, arm, inverse_gram, _, _), (traction, slip, onto_circle) = space, fields
-    move, image = onto_circle.copy(), np.empty_like(slip)
-    m, i, s = move.reshape(2, -1), image.reshape(2, -1), slip.reshape(2, -1)
-    excess = _excess(target, traction.reshape(2, -1), m, arm)
-    _subtract_rigid(projector, arm, _rigid(inverse_gram, excess), m)
-    moved = largest(move) > bounds[0]
+    (projector, arm, inverse_gram, _, _), (traction, slip, onto_circle), stiffness = space, fields, bounds[0]
+    move, left = onto_circle.copy(), np.empty_like(slip)
+    m, r = move.reshape(2, -1), left.reshape(2, -1)
+    _subtract_rigid(projector, arm, _rigid(inverse_gram, _excess(target, traction.reshape(2, -1), m, arm)), m)
+    moved = largest(move) > bounds[1]
     if moved:
-        convolve(move, image, by[0])
+        convolve(move, left, by[0])
+    else:
+        left[:] = 0.0
+    _restrict_slip(space, slip.reshape(2, -1), m, r)
+    top = largest(left)
+    if not 0.0 < top < np.inf:
+        return move, (int(moved), 0, 0)
+    change, count = _conjugate_gradients(_single(space, stiffness), _shares(left, top), by[1:], bounds[2:])
+    _add(m, change.reshape(2, -1), stiffness * top)
+    return move, (count + moved, count, count + 1)
+
+
+@compiled
+def _restrict_slip(space: Space, slip: FloatArray, made: FloatArray, left: FloatArray) -> None:
+    """Make of the displacement by a ``made`` move the slip that is ``left`` in the space, without resultants."""
+    projector, arm, inverse_gram, curvature, _ = space
     for k in range(2):
-        for j in range(s.shape[1]):
-            i[k, j] = s[k, j] + i[k, j] if moved else s[k, j]
-    count = _conjugate_gradients(space, image, move, by, bounds[1:])
-    return move, count + moved, count + 1
+        for i in range(slip.shape[1]):
+            left[k, i] += slip[k, i] + curvature[i] * made[k, i]
+    _subtract_rigid(projector, arm, _rigid(inverse_gram, _restrict(projector, arm, left)), left)
+
+
+@compiled
+def _single(space: Space, stiffness: float) -> SingleSpace:
+    """A space in single precision."""
+    projector, arm, inverse_gram, curvature, scale = space
+    stiff, scales = np.empty(scale.size, dtype=np.float32), np.empty(scale.size, dtype=np.float32)
+    for i in range(scale.size):
+        stiff[i] = min(curvature[i] * stiffness, _STIFFEST)
+        scales[i] = max(scale[i], 1.0 / np.sqrt(_STIFFEST))
+    return projector.astype(np.float32), arm.astype(np.float32), inverse_gram.astype(np.float32), stiff, scales
+
+
+@compiled
+def _shares(field: FloatArray, top: float) -> SingleArray:
+    """A field [2, ny, nx] in units of its largest number, in single precision."""
+    shares = np.empty(field.shape, dtype=np.float32)
+    f, s = field.reshape(-1), shares.reshape(-1)
+    for i in range(f.size):
+        s[i] = f[i] / top
+    return shares
+
+
+@compiled
+def _add(move: FloatArray, change: SingleArray, unit: float) -> None:
+    """Add a change in some unit to a move, in place."""
+    for k in range(2):
+        for i in range(move.shape[1]):
+            move[k, i] += unit * change[k, i]
 
 
 @compiled(fastmath=VECTOR)
@@ -186,13 +242,16 @@ def _excess(target: FloatArray, traction: FloatArray, move: FloatArray, arm: Flo
 
 @compiled
 def _conjugate_gradients(
-    space: Space, image: FloatArray, move: FloatArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
-) -> int:
-    """Add to a move [2, ny, nx] what ``newton_move`` solves for; ``image``: slip after the move so far, which is
-    overwritten. How often it took the operator.
-    """
+    space: SingleSpace, residual: SingleArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
+) -> tuple[SingleArray, int]:
+    """The move [2, ny, nx] that takes a ``residual``, which is overwritten, to zero; how often it took the operator."""
     (operator, preconditioner), (reduction, most) = by, bounds
-    direction, residual, improved = np.zeros_like(move), np.empty_like(move), np.empty_like(move)
+    move, direction, image, improved = (
+        np.zeros_like(residual),
+        np.zeros_like(residual),
+        np.empty_like(residual),
+        np.empty_like(residual),
+    )
     m, d, r, i, g = (
         move.reshape(2, -1),
         direction.reshape(2, -1),
@@ -200,10 +259,12 @@ def _conjugate_gradients(
         image.reshape(2, -1),
         improved.reshape(2, -1),
     )
-    _begin(space, m, r, i)
+    for k in range(2):
+        for j in range(r.shape[1]):
+            i[k, j] = space[4][j] * r[k, j]
     convolve(image, improved, preconditioner)
     size, motion = _improve(space, r, g)
-    first, share, count = size, 0.0, 0
+    first, share, count = size, np.float32(0.0), 0
     while count < most and size > 0.0:
         _turn(space[0], space[1], motion, d, g, share)
         convolve(direction, image, operator)
@@ -215,41 +276,17 @@ def _conjugate_gradients(
         count += 1
         if size <= reduction**2 * first:
             break
-    return count
-
-
-@compiled
-def _begin(space: Space, made: FloatArray, residual: FloatArray, image: FloatArray) -> None:
-    """The first residual from the slip ``image``, which becomes the residual scaled for the preconditioner."""
-    projector, arm, inverse_gram, curvature, scale = space
-    for k in range(2):
-        for i in range(made.shape[1]):
-            residual[k, i] = image[k, i] + curvature[i] * made[k, i]
-    _scale_balanced(projector, arm, scale, _rigid(inverse_gram, _restrict(projector, arm, residual)), residual, image)
-
-
-@compiled(fastmath=VECTOR)
-def _scale_balanced(
-    projector: FloatArray,
-    arm: FloatArray,
-    scale: FloatArray,
-    motion: FloatArray,
-    residual: FloatArray,
-    image: FloatArray,
-) -> None:
-    """Subtract a rigid motion from the residual, in place, and scale that for the preconditioner."""
-    mx, my, yaw = motion[0], motion[1], motion[2]
-    for i in range(residual.shape[1]):
-        dx, dy = mx - arm[1, i] * yaw, my + arm[0, i] * yaw
-        rx = residual[0, i] - projector[0, i] * dx - projector[1, i] * dy
-        ry = residual[1, i] - projector[1, i] * dx - projector[2, i] * dy
-        residual[0, i], residual[1, i] = rx, ry
-        image[0, i], image[1, i] = scale[i] * rx, scale[i] * ry
+    return move, count
 
 
 @compiled
 def _advance(
-    space: Space, move: FloatArray, residual: FloatArray, direction: FloatArray, image: FloatArray, size: float
+    space: SingleSpace,
+    move: SingleArray,
+    residual: SingleArray,
+    direction: SingleArray,
+    image: SingleArray,
+    size: np.float32,
 ) -> None:
     """One conjugate-gradient step in place; ``image``: the operator on ``direction``, then the new residual, scaled for
     the preconditioner.
@@ -261,10 +298,10 @@ def _advance(
 
 @compiled(fastmath=VECTOR)
 def _stiffen(
-    projector: FloatArray, arm: FloatArray, curvature: FloatArray, direction: FloatArray, image: FloatArray
-) -> tuple[float, tuple[float, float, float]]:
+    projector: SingleArray, arm: SingleArray, curvature: SingleArray, direction: SingleArray, image: SingleArray
+) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
     """Restrict C·direction to the space and add the curvature, in place; direction·image, and its resultants."""
-    product = sx = sy = sm = 0.0
+    product = sx = sy = sm = np.float32(0.0)
     for i in range(direction.shape[1]):
         ax, ay, dx, dy = image[0, i], image[1, i], direction[0, i], direction[1, i]
         px = projector[0, i] * ax + projector[1, i] * ay + curvature[i] * dx
@@ -279,12 +316,12 @@ def _stiffen(
 
 @compiled(fastmath=VECTOR)
 def _go_on(
-    projector: FloatArray,
-    arm: FloatArray,
-    scale: FloatArray,
-    motion: FloatArray,
-    fields: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
-    step: float,
+    projector: SingleArray,
+    arm: SingleArray,
+    scale: SingleArray,
+    motion: SingleArray,
+    fields: tuple[SingleArray, SingleArray, SingleArray, SingleArray],
+    step: np.float32,
 ) -> None:
     """Add a step along a direction to the move, and its image without a rigid motion to the residual, in place; scale
     the latter into the image.
@@ -302,7 +339,7 @@ def _go_on(
 
 
 @compiled
-def _improve(space: Space, residual: FloatArray, improved: FloatArray) -> tuple[float, FloatArray]:
+def _improve(space: SingleSpace, residual: SingleArray, improved: SingleArray) -> tuple[np.float32, SingleArray]:
     """Scale a preconditioned residual and restrict it to the space, in place; its product with the residual, and the
     rigid motion whose part in the space has its resultants.
 
@@ -315,10 +352,10 @@ def _improve(space: Space, residual: FloatArray, improved: FloatArray) -> tuple[
 
 @compiled(fastmath=VECTOR)
 def _restrict_scaled(
-    projector: FloatArray, arm: FloatArray, scale: FloatArray, residual: FloatArray, move: FloatArray
-) -> tuple[float, tuple[float, float, float]]:
+    projector: SingleArray, arm: SingleArray, scale: SingleArray, residual: SingleArray, move: SingleArray
+) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
     """Scale a move and restrict it to the space, in place; its product with the residual, and its resultants."""
-    product = sx = sy = sm = 0.0
+    product = sx = sy = sm = np.float32(0.0)
     for i in range(move.shape[1]):
         mx, my = scale[i] * move[0, i], scale[i] * move[1, i]
         px = projector[0, i] * mx + projector[1, i] * my
@@ -333,12 +370,12 @@ def _restrict_scaled(
 
 @compiled(fastmath=VECTOR)
 def _turn(
-    projector: FloatArray,
-    arm: FloatArray,
-    motion: FloatArray,
-    direction: FloatArray,
-    improved: FloatArray,
-    share: float,
+    projector: SingleArray,
+    arm: SingleArray,
+    motion: SingleArray,
+    direction: SingleArray,
+    improved: SingleArray,
+    share: np.float32,
 ) -> None:
     """The next conjugate direction, in place: a share of the last less what is improved without a rigid motion."""
     mx, my, yaw = motion[0], motion[1], motion[2]

@@ -25,7 +25,7 @@ from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.limit_load import limit_load
 from slipcore.contact.solver.projection import nearest_tractions, project
 from slipcore.contact.solver.sliding import sliding_traction
-from slipcore.contact.solver.tangent_space import FIELDS, newton_move, outward, survey
+from slipcore.contact.solver.tangent_space import FIELDS, Taken, newton_move, outward, survey
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
 
@@ -182,11 +182,13 @@ class _TangentialStep:
         """Newton's steps, in place, from the last two residuals and the first round to the tolerance or to the last
         round; the residual there, and the round.
         """
-        by = self.operator.tangential_compiled, self.operator.tangential_inverse.compiled
+        operator = self.operator
+        by = operator.tangential_compiled, operator.tangential_single, operator.tangential_inverse.single
         how = self.stiffness, self.largest, tolerance
-        self.dual, residual, iterations, counts = _rounds(here, self.constraints, by, how, self.dual, residuals, rounds)
-        self.operator.count.tangential += counts[0]
-        self.operator.count.inverse += counts[1]
+        self.dual, residual, iterations, taken = _rounds(here, self.constraints, by, how, self.dual, residuals, rounds)
+        count = operator.count
+        count.tangential, count.single = count.tangential + taken[0], count.single + taken[1]
+        count.inverse += taken[2]
         return residual, iterations
 
     def _result(self, here: Fields, residual: float, iterations: int) -> TangentialContact:
@@ -243,30 +245,29 @@ def _extent(points: FloatArray, limit: FloatArray) -> tuple[float, float, float]
 def _rounds(
     here: Fields,
     constraints: Constraints,
-    by: tuple[Compiled, Compiled],
+    by: tuple[Compiled, Compiled, Compiled],
     how: tuple[float, float, float],
     dual: FloatArray,
     residuals: tuple[float, float],
     rounds: tuple[int, int],
-) -> tuple[FloatArray, float, int, tuple[int, int]]:
-    """``_TangentialStep._go_on``: the dual, the last residual, the round, and how often operator and preconditioner
-    were taken, which it is done ``by``.
+) -> tuple[FloatArray, float, int, Taken]:
+    """``_TangentialStep._go_on``: the dual, the last residual, the round, and what was taken.
 
-    ``how``: the stiffness that scales a gradient step, the largest limit, and the tolerance. Where Newton's steps
-    stall, the gradient step is taken every other time.
+    ``by``: operator, the same in single precision, and preconditioner; ``how``: the stiffness that scales a gradient
+    step, the largest limit, and the tolerance. Where Newton's steps stall, the gradient step is taken every other time.
     """
     (traction, displacement, _, slip, nearest), (stiffness, top, tolerance) = here, how
-    (before, residual), (iteration, last), applied, inverted = residuals, rounds, 0, 0
+    (before, residual), (iteration, last), (applied, single, inverted) = residuals, rounds, (0, 0, 0)
     while iteration < last and tolerance < residual < np.inf:
         trial = nearest.copy()
         if residual <= _SLOW * before or iteration % 2 == 0:
-            counts = _newton(traction, slip, trial, constraints, by, (stiffness, _MOVE_ROUNDING * top))
-            applied, inverted = applied + counts[0], inverted + counts[1]
+            taken = _newton(traction, slip, trial, constraints, by, (stiffness, _MOVE_ROUNDING * top))
+            applied, single, inverted = applied + taken[0], single + taken[1], inverted + taken[2]
         _search((traction, displacement), slip, trial, constraints[0], by[0])
         dual, change = _natural_map(here, constraints, stiffness, dual)
         before, residual = residual, change / top
         applied, iteration = applied + 1, iteration + 1
-    return dual, residual, iteration, (applied, inverted)
+    return dual, residual, iteration, (applied, single, inverted)
 
 
 @compiled
@@ -275,20 +276,20 @@ def _newton(
     slip: FloatArray,
     trial: FloatArray,
     constraints: Constraints,
-    by: tuple[Compiled, Compiled],
+    by: tuple[Compiled, Compiled, Compiled],
     how: tuple[float, float],
-) -> tuple[int, int]:
-    """Fill the ``trial`` with where a Newton step leads, projected back; how often it took what it is done ``by``."""
+) -> Taken:
+    """Fill the ``trial`` with where a Newton step leads, projected back; what it took."""
     (radius, arm, target, given), (stiffness, negligible) = constraints, how
     cells, q, p = np.empty((FIELDS, radius.size)), traction.reshape(2, -1), trial.reshape(2, -1)
     inverse_gram = survey((q, slip.reshape(2, -1), radius, stiffness), (arm, given), cells)
     space, onto_circle = (cells[:3], arm, inverse_gram, cells[5], cells[6]), cells[3:5].reshape(traction.shape)
-    bounds = negligible, _REDUCTION, _ITERATIONS
-    move, count, inverted = newton_move(space, (traction, slip, onto_circle), target, by, bounds)
+    bounds = stiffness, negligible, _REDUCTION, _ITERATIONS
+    move, taken = newton_move(space, (traction, slip, onto_circle), target, by, bounds)
     point = np.empty_like(q)
     outward(q, move.reshape(2, -1), cells[6], point)
     nearest_tractions((point, radius, arm, target, given), np.zeros(3), p, _PROJECTION_STEPS)
-    return count, inverted
+    return taken
 
 
 @compiled

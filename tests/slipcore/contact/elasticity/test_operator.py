@@ -5,7 +5,8 @@ import pytest
 
 from slipcore.contact.elasticity.grid import Grid, bounding_box
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.elasticity.operator import ElasticOperator, Operators
+from slipcore.contact.elasticity.transform import convolve
 
 GRID = Grid((7, 10), (1.0, 1.5))
 BODY = HalfSpace(1.3, 0.3)
@@ -94,3 +95,19 @@ def test_a_box_takes_its_kernels_from_the_whole() -> None:
     assert within.source is not None
     assert Operators((BODY,), whole=whole).on(Grid.square(20, 5e-3)).source is None  # another pitch
     assert Operators((BODY,), whole=whole).on(Grid((64, 20), whole.pitch)).source is None  # larger
+
+
+def test_single_precision_is_in_units_of_a_cell_on_itself() -> None:
+    operator = ElasticOperator((HalfSpace.from_young(1e6, 0.3),), Grid((17, 20), (1e-4, 1e-4)))
+    own, field = operator.influence("xx")[0, 0], np.random.default_rng(0).normal(size=(2, 17, 20))
+    cases = (
+        (operator.tangential_single, operator.tangential(field) / own),
+        (
+            operator.tangential_inverse.single,
+            operator.tangential_inverse(field) * own,
+        ),
+    )
+    for compiled, expected in cases:
+        result = np.empty(field.shape, dtype=np.float32)
+        convolve(field.astype(np.float32), result, compiled)
+        np.testing.assert_allclose(result, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())

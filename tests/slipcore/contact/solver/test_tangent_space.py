@@ -5,6 +5,7 @@ import numpy as np
 from slipcore.contact.elasticity.fields import inner, resultants, rigid_displacement
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.contact.elasticity.transform import Compiled
 from slipcore.contact.solver import tangent_space as compiled
 from tests.slipcore.contact.solver.following import body
 
@@ -54,6 +55,14 @@ def flat(field: np.ndarray) -> np.ndarray:
     return field.reshape(len(field), -1)
 
 
+def single(field: np.ndarray) -> np.ndarray:
+    return flat(field).astype(np.float32)
+
+
+def by(operator: ElasticOperator) -> tuple[Compiled, Compiled, Compiled]:
+    return operator.tangential_compiled, operator.tangential_single, operator.tangential_inverse.single
+
+
 def test_cells_stick_inside_their_disk_and_slide_on_it() -> None:
     traction, slip, limit, arm, _ = case()
     space = Found(traction, slip, limit, 0.5, arm)
@@ -95,12 +104,9 @@ def test_the_first_part_of_a_move_leads_onto_the_circles_and_to_the_load() -> No
     traction, slip, limit, arm, _ = case(2)
     space, target = Found(traction, slip, limit, 0.5, arm), np.array([0.3, -0.2, 0.7])
     operator = ElasticOperator((body(),), Grid(limit.shape, (1.0, 1.0)))
-    by, fields = (
-        (operator.tangential_compiled, operator.tangential_inverse.compiled),
-        (traction, slip, space.onto_circle),
-    )
-    move, *counts = compiled.newton_move(space.space, fields, target, by, (np.inf, 0.05, 0))
-    assert counts == [0, 1]
+    fields = traction, slip, space.onto_circle
+    move, taken = compiled.newton_move(space.space, fields, target, by(operator), (1.0, np.inf, 0.05, 0))
+    assert taken == (0, 0, 1)
     np.testing.assert_allclose(resultants(traction + move, arm), target, rtol=1e-11)
     balancing = move - space.onto_circle
     np.testing.assert_allclose(balancing, tangent(space, balancing), rtol=0.0, atol=1e-13)
@@ -112,15 +118,13 @@ def test_newton_moves_take_the_slip_from_the_space() -> None:
     stiffness = 1.0 / operator.influence("xx")[0, 0]
     slip *= 0.5 / stiffness
     space = Found(traction, slip, limit, stiffness, arm)
-    by, fields = (
-        (operator.tangential_compiled, operator.tangential_inverse.compiled),
-        (traction, slip, space.onto_circle),
-    )
-    move, count, inverted = compiled.newton_move(space.space, fields, target, by, (0.0, 1e-9, 400))
-    assert count == inverted > 2
+    fields = traction, slip, space.onto_circle
+    bounds = stiffness, 0.0, 1e-4, 100
+    move, (applied, singles, inverted) = compiled.newton_move(space.space, fields, target, by(operator), bounds)
+    assert applied == inverted == singles + 1 > 2
     left = space.balanced(slip + operator.tangential(move) + space.curvature * move)
-    assert np.abs(left).max() <= 1e-8 * np.abs(space.balanced(slip)).max()
-    np.testing.assert_allclose(resultants(traction + move, arm), target, rtol=0.0, atol=1e-11)
+    assert np.abs(left).max() <= 1e-3 * np.abs(space.balanced(slip)).max()
+    np.testing.assert_allclose(resultants(traction + move, arm), target, rtol=0.0, atol=1e-5)
 
 
 def test_rigid_motions_are_subtracted_within_the_space() -> None:
@@ -137,12 +141,12 @@ def test_stiffening_restricts_and_adds_the_curvature() -> None:
     space = Found(traction, slip, limit, 0.5, arm)
     direction = space.balanced(slip)
     expected = tangent(space, answer) + space.curvature * direction
-    product, sums = compiled._stiffen(
-        flat(space.projector), flat(arm), space.curvature.ravel(), flat(direction), flat(answer)
-    )
-    np.testing.assert_allclose(answer, expected, rtol=0.0, atol=1e-13)
-    np.testing.assert_allclose(product, inner(direction, expected), rtol=1e-12)
-    np.testing.assert_allclose(sums, resultants(expected, arm), rtol=0.0, atol=1e-12)
+    projector, places, _, curvature, _ = compiled._single(space.space, 1.0)
+    image = single(answer)
+    product, sums = compiled._stiffen(projector, places, curvature, single(direction), image)
+    np.testing.assert_allclose(image, flat(expected), rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(product, inner(direction, expected), rtol=1e-5)
+    np.testing.assert_allclose(sums, resultants(expected, arm), rtol=0.0, atol=1e-4)
 
 
 def test_gram_holds_the_products_of_rigid_motions() -> None:
@@ -157,25 +161,36 @@ def test_advancing_moves_updates_the_residual_and_scales_it() -> None:
     traction, slip, limit, arm, answer = case(6)
     space = Found(traction, slip, limit, 0.5, arm)
     direction, residual = space.balanced(slip), space.balanced(np.ones_like(slip))
-    move, before, response = np.zeros_like(slip), residual.copy(), tangent(space, answer) + space.curvature * direction
+    response = tangent(space, answer) + space.curvature * direction
     step = 0.25 / inner(direction, response)
-    compiled._advance(space.space, flat(move), flat(residual), flat(direction), flat(answer), 0.25)
-    np.testing.assert_allclose(move, step * direction, rtol=1e-12)
-    expected = space.balanced(before + step * response)
-    np.testing.assert_allclose(residual, expected, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(answer, space.scale * residual, rtol=1e-14)
+    move, image, left = single(np.zeros_like(slip)), single(answer), single(residual)
+    compiled._advance(compiled._single(space.space, 1.0), move, left, single(direction), image, np.float32(0.25))
+    np.testing.assert_allclose(move, flat(step * direction), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(left, flat(space.balanced(residual + step * response)), rtol=0.0, atol=1e-4)
+    np.testing.assert_allclose(image, space.scale.ravel() * left, rtol=1e-6)
 
 
 def test_improving_scales_restricts_and_multiplies_and_turning_balances() -> None:
     traction, slip, limit, arm, improved = case(7)
     space = Found(traction, slip, limit, 0.5, arm)
-    residual, direction = space.balanced(slip), improved.copy()
-    expected = space.balanced(space.scale * improved)
-    product, motion = compiled._improve(space.space, flat(residual), flat(improved))
-    np.testing.assert_allclose(product, inner(residual, expected), rtol=1e-12)
-    turned = 0.3 * direction - expected
-    compiled._turn(flat(space.projector), flat(arm), motion, flat(direction), flat(improved), 0.3)
-    np.testing.assert_allclose(direction, turned, rtol=0.0, atol=1e-13)
+    residual, direction, better = space.balanced(slip), single(improved), single(improved)
+    expected, halves = space.balanced(space.scale * improved), compiled._single(space.space, 1.0)
+    product, motion = compiled._improve(halves, single(residual), better)
+    np.testing.assert_allclose(product, inner(residual, expected), rtol=1e-5)
+    compiled._turn(halves[0], halves[1], motion, direction, better, np.float32(0.3))
+    np.testing.assert_allclose(direction, flat(0.3 * improved - expected), rtol=0.0, atol=1e-5)
+
+
+def test_single_precision_holds_any_curvature() -> None:
+    traction, slip, limit, arm, _ = case(8)
+    space = Found(traction, slip, limit, 0.5, arm)
+    space.curvature[space.slides] = 1e300
+    space.scale[space.slides] = 1e-150
+    _, _, _, curvature, scale = compiled._single(space.space, 0.5)
+    assert np.isfinite(curvature).all()
+    assert (scale > 0.0).all()
+    sliding = space.slides.ravel()
+    np.testing.assert_allclose((curvature * scale**2)[sliding], 1.0, rtol=1e-5)
 
 
 def test_the_inverse_of_a_singular_gram_is_its_pseudo_inverse() -> None:
