@@ -156,7 +156,7 @@ def held_by(elements: BoolArray, share: float, noise: FloatArray) -> ContactFric
     force = noise.copy()
     force[:, elements] += NORMAL_FORCE / elements.sum() * np.array([share, 0.0, -1.0])
     log = GraspLog(time, position, np.zeros_like(force), 9e-6, force, np.broadcast_to([0.0, 0.0, 1.0], force.shape))
-    touching = np.broadcast_to(elements, force.shape[:3])
+    touching = np.tile(elements, (len(force), 1, 1))
     found = contact_friction(time, follow_patches(log, touching, np.zeros_like(touching)))
     assert found is not None
     return found
