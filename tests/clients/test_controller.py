@@ -606,8 +606,8 @@ def test_samples_ask_for_a_force_only_while_it_is_lowered_and_once_there_are_eno
 
 @pytest.mark.parametrize("mode", ["feel", "learn"])
 @pytest.mark.parametrize("waits", [False, True])
-def test_the_most_slippery_material_asks_for_a_force_only_while_one_is_to_be_recognised(mode: str, waits: bool) -> None:
-    among: Any = SimpleNamespace(waits=lambda *_: waits, least_friction=lambda *_: 0.9)
+def test_the_materials_ask_for_a_force_only_while_one_is_to_be_recognised(mode: str, waits: bool) -> None:
+    among: Any = SimpleNamespace(waits=lambda *_: waits, borne=lambda *_: 0.9)
     state = dataclasses.replace(GraspController.init(SETTINGS), mode=mode, recognition=among)
     reasons = [each.reason for each in controller._demands(state, Observation(0.0, 5.0, 2.0))]
     is_waited_for = waits and mode == "feel"

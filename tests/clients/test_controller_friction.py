@@ -200,10 +200,20 @@ def test_samples_are_waited_for_as_long_as_may_be(time: float, waits: bool) -> N
     assert recognition(paper=0.4).step(5.0, True, math.nan, 0, SETTINGS).waits(time, SETTINGS) is waits
 
 
-def test_the_most_slippery_material_counts_until_one_is_known() -> None:
+def test_slip_is_waited_for_up_to_what_learning_needs_of_the_stickiest_material() -> None:
+    both, paper = recognition(paper=0.6, glass=0.3), recognition(paper=0.6)
+    assert both.borne(1.0, SETTINGS) == pytest.approx(paper.borne(1.0, SETTINGS))
+    low, _ = paper.materials["paper"].bounds(1.0)
+    assert paper.borne(1.0, SETTINGS) == pytest.approx(low * utilisation(SETTINGS.learn_stick_ratio))
+
+
+@pytest.mark.parametrize(("sampled", "borne"), [(0.3, 0.3 * utilisation(0.1)), (0.1, 0.2), (0.9, None)])
+def test_no_more_is_borne_than_samples_say_and_no_less_than_most_objects_bear(
+    sampled: float, borne: float | None
+) -> None:
     both = recognition(paper=0.6, glass=0.3)
-    assert both.least_friction(1.0) == pytest.approx(recognition(glass=0.3).least_friction(1.0))
-    assert both.least_friction(1.0) < recognition(paper=0.6).least_friction(1.0)
+    told = both.step(0.0, True, sampled, 3, SETTINGS).borne(1.0, SETTINGS)
+    assert told == pytest.approx(both.borne(1.0, SETTINGS) if borne is None else borne)
 
 
 @pytest.mark.parametrize(("sampled", "name"), [(0.6, "paper"), (0.3, "glass"), (2.5, "unknown")])

@@ -126,6 +126,48 @@ def test_samples_of_long_ago_are_forgotten(materials: dict[str, FrictionModel]) 
     assert (among.loaded, among.sampled, among.mean, among.count, among.frames) == (0.0, 1.6, 0.7, 4, 1)
 
 
+def test_a_ring_is_sampled_though_the_stick_ratio_after_a_rise_of_the_force_says_otherwise(
+    materials: dict[str, FrictionModel],
+) -> None:
+    """A stick ratio of 0.8 under 0.4 of 2 N would be a friction of 0.7, if the force had not risen under the load."""
+    state = GraspController.init(SETTINGS, materials=materials)
+    for frame in range(1, 10):
+        told = SlipSamples(np.full(4, 0.3), np.full(4, 0.03))  # of the 0.18 N that the ring bears
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.4, 0.0, 0.8, told))
+    assert command.material == "steel"
+
+
+def test_a_few_elements_of_the_ring_that_the_stick_ratio_contradicts_are_no_samples(
+    materials: dict[str, FrictionModel],
+) -> None:
+    state = GraspController.init(SETTINGS, materials=materials)
+    for frame in range(1, 10):
+        told = SlipSamples(np.full(1, 0.3), np.full(1, 0.03))
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.4, 0.0, 0.8, told))
+    assert command.material is None
+    assert state.recognition is not None
+    assert state.recognition.frames == 0
+
+
+def test_the_force_is_held_still_while_a_load_grows_and_then_pressed_for_the_load_to_come(
+    materials: dict[str, FrictionModel],
+) -> None:
+    state = GraspController.init(SETTINGS, materials=materials)
+    force, load = [0.5], [0.0]
+    for frame in range(1, 55):
+        load.append(0.02 * frame)  # 1.2 N/s
+        state, command = GraspController.step(state, Observation(frame * FRAME, force[-1], load[-1], 0.0, 1.0))
+        force.append(command.normal_force)
+    rises = np.flatnonzero(np.diff(force) > 0.0)
+    assert rises.size < 8  # in steps of 2.5 N a frame, by the rate at which forces may rise
+    held = np.diff(np.concatenate([[0], rises, [54]])).max()
+    assert held > 20
+    assert state.recognition is not None
+    most = state.recognition.borne(1.0, SETTINGS)
+    assert most > 0.3  # more than the most slippery of the materials bears
+    assert all(tangential <= most * normal for tangential, normal in zip(load[1:], force[1:], strict=True))
+
+
 def test_a_step_among_a_hundred_materials_costs_hardly_more_than_one_with_a_model(make_model: Make) -> None:
     """Where a step with a model takes 62 µs: up to 100 µs are asked. They lie so close that none is recognised."""
     many = {str(k): make_model(coefficients=(0.3 + 4e-3 * k, 0.0, 0.0)) for k in range(100)}

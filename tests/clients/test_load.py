@@ -58,6 +58,13 @@ def test_a_load_leads_by_the_faster_of_rate_and_trend_above_their_noise(rate: fl
     assert load.growth(SETTINGS) == pytest.approx(lead / 2.0)
 
 
+def test_a_load_goes_on_growing_as_it_does() -> None:
+    load = LoadEstimate(2.0, rate=1.8, trend=0.7)
+    assert load.after(0.0, SETTINGS) == 2.0
+    assert load.after(0.7, SETTINGS) == pytest.approx(2.7)
+    assert load.after(SETTINGS.lead_time, SETTINGS) == load.lead(SETTINGS)
+
+
 def test_nothing_does_not_grow_by_any_factor() -> None:
     assert LoadEstimate(0.0, 5.0, 5.0).growth(SETTINGS) == 1.0
     assert LoadEstimate(0.0, 5.0, 5.0).lead(SETTINGS) == pytest.approx(0.48)

@@ -100,13 +100,13 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     sampled = _sampled(observation, sticking, state.settings)
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, sticking, load.size, state.settings)
     learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
+    count = 0 if samples is None else samples.normal_force.size
     counts = samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees)
-    if samples is not None and counts:
-        taken = agrees or (_has_model(state) and _covers_ring(samples, observation, state.settings))
-        learned = learned.with_frame(sampled, samples.normal_force.size, taken, state.settings)
+    covers = samples is not None and counts and _covers_ring(samples, observation, state.settings)
+    if counts:
+        learned = learned.with_frame(sampled, count, agrees or (covers and _has_model(state)), state.settings)
     if recognition is not None:
-        ratio = sampled if agrees and counts else math.nan
-        count = 0 if samples is None else samples.normal_force.size
+        ratio = sampled if counts and (agrees or covers) else math.nan
         recognition = recognition.step(observation.time, _loaded(load, state.settings), ratio, count, state.settings)
     against = _contradicts(state, sticking, observation.normal, load.size)
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
@@ -328,13 +328,25 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
         most = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
         return [each if each.reason == "slip" else _Demand(min(each.force, most), each.reason) for each in demands]
     if among is not None and waits:
-        slippery = max(among.least_friction(observation.normal), settings.unknown_friction)
-        asked = load / slippery
-        demands += [_Demand(each, "to be recognised") for each in (asked, state.normal_force)]
+        demands.append(_Demand(load / among.borne(observation.normal, settings), "to be recognised"))
+        demands = _held_still(state, demands)
     elif state.mode != "learn":
         why = "no stick ratio" if _blind(state) else "friction unknown"
         demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
     return demands
+
+
+def _held_still(state: ControllerState, demands: list[_Demand]) -> list[_Demand]:
+    """Demands of a grip that stays as it is, or is pressed at once for the load that is still to come.
+
+    Under a force that grows with the load nothing slips, however near to slipping it is (Mindlin and Deresiewicz,
+    1953): what slips shows only while the load grows under a force that doesn't.
+    """
+    most = max(demands, key=lambda each: each.force)
+    if most.force <= state.normal_force or state.load.size == 0.0:
+        return [*demands, _Demand(state.normal_force, "to be recognised")]
+    grows = state.load.after(state.settings.recognise_time, state.settings) / state.load.lead(state.settings)
+    return [*demands, _Demand(most.force * max(grows, 1.0), most.reason)]
 
 
 def _shown(state: ControllerState) -> float:

@@ -36,8 +36,12 @@ class LoadEstimate:
 
     def lead(self, settings: ControlSettings) -> float:
         """Size in ``lead_time``, N, if it grows; else as it is."""
+        return self.after(settings.lead_time, settings)
+
+    def after(self, time: float, settings: ControlSettings) -> float:
+        """Size in ``time`` s, N, if it goes on growing as it does; else as it is."""
         rate = max(self.rate - settings.rate_floor, self.trend - settings.trend_floor, 0.0)
-        return self.size + rate * settings.lead_time
+        return self.size + rate * time
 
     def growth(self, settings: ControlSettings) -> float:
         """Factor by which the load will have grown in ``lead_time``."""

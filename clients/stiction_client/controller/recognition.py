@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction_client.controller.friction import KnownFriction, error_of_mean
+from stiction_client.controller.friction import KnownFriction, error_of_mean, utilisation
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.defaults import UNKNOWN_FRICTION, UNKNOWN_LEVEL, UNKNOWN_SHARE
 from stiction_client.elementwise import FloatArray
@@ -70,9 +70,15 @@ class GripRecognition:
         mean = self.mean + (friction - self.mean) * count / total
         return replace(begun, mean=mean, count=total, frames=self.frames + 1)
 
-    def least_friction(self, force: float) -> float:
-        """Of the most slippery material: its quantile under ``force`` N."""
-        return float(self._low_and_mean(force)[0].min())
+    def borne(self, force: float, settings: ControlSettings) -> float:
+        """Load over a force of ``force`` N up to which the grip stays as it is, so that something slips.
+
+        Of the stickiest material then slips what learning needs; what is more slippery slips before, and the stick
+        ratio and the samples show it.
+        """
+        stickiest = float(self._low_and_mean(force)[0].max()) * utilisation(settings.learn_stick_ratio)
+        sampled = self.mean * utilisation(settings.reflex_stick_ratio) if self.frames else math.inf
+        return max(min(stickiest, sampled), settings.unknown_friction)
 
     def likeliest(self, force: float, settings: ControlSettings) -> tuple[str, float]:
         """The name with the largest of ``probabilities``, and that."""

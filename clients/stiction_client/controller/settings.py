@@ -88,7 +88,7 @@ class ControlSettings:
     ] = 0.13
     recognise_time: Annotated[
         float,
-        Gain(0.0, 10.0, "s", "how long a load is gripped for the most slippery one, and samples add up"),
+        Gain(0.0, 10.0, "s", "how long slip of a load is waited for, and samples add up"),
     ] = 1.0
     recognise_frames: Annotated[int, Gain(1, 100, "frames", "the first ones have few elements, and the same ones")] = 5
     recognise_probability: Annotated[
