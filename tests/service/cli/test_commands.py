@@ -356,7 +356,8 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
 def test_logs_are_given_their_sensor_and_asked_for_as_it_shows_friction(
     run: Run, ramps: list[Path], url: str, tmp_path: Path
 ) -> None:
-    members = dict(np.load(ramps[1]))
+    with np.load(ramps[1]) as archive:
+        members = dict(archive)
     np.savez(tmp_path / "more.npz", **members | {"force": members["force"] * [1.3, 1.3, 1.0]})
     for log, sensor in ((ramps[0], "left"), (tmp_path / "more.npz", "right")):
         sent = run("upload", log, "--material", "felt by two", "--create", "--sensor", sensor, "--url", url, "--json")

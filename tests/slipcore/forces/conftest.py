@@ -31,7 +31,8 @@ def pressed() -> Pressed:
     Of it: some ``frames`` (0 to 7), with ``noise`` m, the ``axes`` that are seen, and a ``crop`` of the lattice.
     """
     outward = np.array([1.0, 1.0, -1.0])
-    force = np.load(SCENES / "cond1_layer5c_forces.npz")["f"].transpose(0, 2, 1, 3) * outward
+    with np.load(SCENES / "cond1_layer5c_forces.npz") as forces:
+        force = forces["f"].transpose(0, 2, 1, 3) * outward
     with np.load(SCENES / "cond1_layer5c.npz") as scene:
         moved = 1e-3 * scene["u"].transpose(0, 2, 1, 3) * outward
         x, y = np.meshgrid(1e-3 * scene["x"], 1e-3 * scene["y"], indexing="ij")

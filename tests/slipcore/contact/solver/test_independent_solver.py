@@ -34,6 +34,11 @@ def finger(poisson: float) -> HalfSpace:
     return HalfSpace.from_young(YOUNG, poisson)
 
 
+def members(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as archive:
+        return dict(archive)
+
+
 def run(scene: Any, problem: ContactProblem, tolerance: float) -> list[StepResult]:
     """Results at the steps that the scene keeps."""
     columns = (scene["F_N"], scene["F_T"], 1e-3 * scene["M"])
@@ -50,7 +55,7 @@ def points(scene: Any) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("name", ["cond1", "cond4", "reversal", "ring"])
 def test_displacements_and_all_masks_are_met(name: str) -> None:
-    scene = np.load(SCENES / f"{name}.npz")
+    scene = members(SCENES / f"{name}.npz")
     problem = ContactProblem((finger(float(scene["nu"])),), FRICTION, heights=HEIGHTS.get(name, (ball,)))
     at, largest = points(scene), 1e-3 * np.abs(scene["u"]).max()
     for k, result in enumerate(run(scene, problem, 1e-5)):
@@ -68,7 +73,7 @@ def test_a_bonded_layer_with_coupling_is_met(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(
         quasi_static, "from_touch", lambda equations, _, guess: (equations, guess, 0.0 * equations.offset)
     )
-    scene = np.load(SCENES / "cond1_layer5c.npz")
+    scene = members(SCENES / "cond1_layer5c.npz")
     poisson = float(scene["nu"])
     bodies = (finger(poisson), LayerBase(5e-3, YOUNG, poisson))
     problem = ContactProblem(bodies, FRICTION, heights=(ball,), coupled=True)
