@@ -219,14 +219,14 @@ class QuasiStatic:
         np.multiply(after.stress.traction, self.grid.cell_area, out=force[:2])
         np.multiply(after.stress.pressure, self.grid.cell_area, out=force[2])
         return StepResult(
-            displacement=sum(after.creep, start=after.elastic),
+            displacement=sum(after.creep, start=after.elastic.copy()),
             force=force,
             limit=after.stress.limit * self.grid.cell_area,
             slip=on_whole(self.grid, box, slip),
             contact=contact,
             at_limit=on_whole(self.grid, box, at_limit),
             moved=on_whole(self.grid, box, moved),
-            pose=after.pose,
+            pose=after.pose.copy(),
             approach=normal.approach,
             sliding=tangential.sliding and bool(contact.any()),
             residual=tangential.residual,

@@ -208,3 +208,15 @@ def test_only_a_body_that_touches_and_bears_no_more_slides() -> None:
     _, moved = solver.step(state, pulled)
     _, lifted = solver.step(state, shear(0.0, 0.0))
     assert (pressed.sliding, moved.sliding, lifted.sliding) == (False, True, False)
+
+
+def test_what_is_written_to_a_result_does_not_reach_the_next_step() -> None:
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(24, 11e-3))
+    state, result = solver.step(solver.start(), shear(FORCE, 0.0))
+    _, wanted = solver.step(state, shear(FORCE, 1.0))
+    for field in (result.displacement, result.force, result.limit, result.slip, result.pose):
+        field[:] = np.nan
+    _, found = solver.step(state, shear(FORCE, 1.0))
+    np.testing.assert_array_equal(found.displacement, wanted.displacement)
+    np.testing.assert_array_equal(found.force, wanted.force)
+    np.testing.assert_array_equal(found.pose, wanted.pose)
