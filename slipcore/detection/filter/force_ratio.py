@@ -17,8 +17,8 @@ from slipcore.frames import FloatArray
 HALF_LOG_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 
 
-class ToldByForces(NamedTuple):
-    """What the forces on elements tell of slip, [k] each: its ``log_odds``, and what they are found from: the force
+class ForceEvidence(NamedTuple):
+    """Evidence of slip by the forces on elements, [k] each: its ``log_odds``, and what they are found from: the force
     ``ratio`` and its ``variance``; the weighted sum of ratios at which the element was ``seen`` to slip, and its
     ``weight``.
     """
@@ -46,16 +46,16 @@ def below_limit(
 
 
 @compiled(inline=True)
-def find_ratio_log_odds(told: ToldByForces, friction: float, gain: float, tuning: Tuning) -> None:
-    """Fill the log-likelihood ratio of slip at a force ratio: near the one it slips at, against anywhere below it; the
-    other rows of what is ``told`` are used up.
+def find_ratio_log_odds(evidence: ForceEvidence, friction: float, gain: float, tuning: Tuning) -> None:
+    """Fill the log-likelihood ratio of slip at a force ratio: near the one it slips at, against anywhere below it;
+    the other rows are used up.
 
     In slip the ratio is normal about the limit λ with deviation s, in stick uniform below λ and as blurred: log(λ/s) +
     log φ(z) − log Φ(z) with z = (λ − ratio)/s, and constant above λ.
     """
-    log_odds, below, log_cdf = told.log_odds, told.ratio, told.seen
+    log_odds, below, log_cdf = evidence.log_odds, evidence.ratio, evidence.seen
     for e in range(len(log_odds)):
-        given = told.ratio[e], told.variance[e], told.seen[e], told.weight[e]
+        given = evidence.ratio[e], evidence.variance[e], evidence.seen[e], evidence.weight[e]
         below[e], log_odds[e] = below_limit(*given, friction, gain, tuning)
         log_cdf[e] = below[e]
     logarithms(log_odds)
@@ -87,28 +87,28 @@ def weigh_forces(
     tuning: Tuning,
     after: FloatArray,
     common: FloatArray,
-    told: ToldByForces,
+    evidence: ForceEvidence,
 ) -> None:
-    """Learn the force ratio at which elements slip, each its own and the mean of all; fill what is ``told`` of each.
+    """Learn the force ratio at which elements slip, each its own and the mean of all; fill the ``evidence`` of each.
 
     ``noise`` of an element's normal force, N. Of an element whose force opposes the motion the ratio is that of stick.
     """
     gain, memory = low_pass(interval, tuning.force_smoothing), -math.expm1(-interval / tuning.ratio_memory)
     left = gain / (2.0 - gain)
     least = max(tuning.force_to_noise * noise * math.sqrt(left), tuning.ratio_least_force)
-    total, weights = learn_ratios(elements, places, noise * noise * left, least, memory, tuning, after, told)
+    total, weights = learn_ratios(elements, places, noise * noise * left, least, memory, tuning, after, evidence)
     common[FRICTION] += memory * (total - common[FRICTION])
     common[FRICTION + 1] += memory * (weights - common[FRICTION + 1])
     friction = common[FRICTION] / common[FRICTION + 1] if common[FRICTION + 1] > 0.0 else 0.0
     if not friction > 0.0:
-        told.log_odds[:] = 0.0
+        evidence.log_odds[:] = 0.0
         return
-    find_ratio_log_odds(told, friction, memory, tuning)
+    find_ratio_log_odds(evidence, friction, memory, tuning)
     weight, most = tuning.ratio_weight * gain, tuning.ratio_limit
     for e in range(len(places)):
         i, j = places[e]
         counts = after[NORMAL, i, j] > least
-        told.log_odds[e] = weight * min(max(told.log_odds[e], -most), most) if counts else 0.0
+        evidence.log_odds[e] = weight * min(max(evidence.log_odds[e], -most), most) if counts else 0.0
 
 
 @compiled
@@ -129,9 +129,9 @@ def learn_ratios(
     memory: float,
     tuning: Tuning,
     after: FloatArray,
-    told: ToldByForces,
+    evidence: ForceEvidence,
 ) -> tuple[float, float]:
-    """Forget by ``memory`` and add the force ratios of what most likely slips; fill in what is ``told`` the variances
+    """Forget by ``memory`` and add the force ratios of what most likely slips; fill in the ``evidence`` the variances
     of ratios, the ratios themselves, and those seen to slip. The weighted sum of all that slip, and its weight.
 
     Only where the normal force is above ``least`` N, and the object's force does not oppose its motion. ``noise``:
@@ -156,5 +156,5 @@ def learn_ratios(
         seen = (1.0 - memory) * elements[RATIO, i, j] + own * ratio
         weight = (1.0 - memory) * elements[RATIO_WEIGHT, i, j] + own
         after[RATIO, i, j], after[RATIO_WEIGHT, i, j] = seen, weight
-        told.ratio[e], told.variance[e], told.seen[e], told.weight[e] = ratio, variance, seen, weight
+        evidence.ratio[e], evidence.variance[e], evidence.seen[e], evidence.weight[e] = ratio, variance, seen, weight
     return total, weights

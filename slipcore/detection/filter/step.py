@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Estimates, Increment, Measurements, update_elements
-from slipcore.detection.filter.force_ratio import ToldByForces, follow_forces, keep_ratios, weigh_forces
+from slipcore.detection.filter.force_ratio import ForceEvidence, follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
@@ -88,7 +88,7 @@ def step_elements(
     noise = frame.time - last.time, variance, force_noise
     lasting = tell_noise(room.surface, tuning, common)
     places = room.places[: find_places(elements, stays, room.places)]
-    anchors, motion, deeper, change, told, seen, states = rooms_of(room.rows, len(places))
+    anchors, motion, deeper, change, evidence, seen, states = rooms_of(room.rows, len(places))
     shift = shift_of_surroundings(last, frame, before.contact, after.contact, room.weight, room.rows, tuning, common)
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
@@ -102,7 +102,7 @@ def step_elements(
     gain = low_pass(noise[0], tuning.force_smoothing)
     follow_forces(elements, room.surface, has_force, gain, after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, after.elements)
-    look_at_forces(elements, places, compared, held, noise, tuning, told, after)
+    look_at_forces(elements, places, compared, held, noise, tuning, evidence, after)
     start_elements(position, frame.displacement, shift, stays, pose, variance, after)
     begins = not (restick or math.isnan(room.surface.noise[0]))  # slip does not before noise is known
     find_readiness(elements, after.contact, places, begins, tuning, room.weight, seen.readiness)
@@ -155,20 +155,20 @@ def look_at_forces(
     held: bool,
     noise: tuple[float, float, float],
     tuning: Tuning,
-    told: ToldByForces,
+    evidence: ForceEvidence,
     after: Memory,
 ) -> None:
-    """Fill ``told`` with the log-odds of slip that forces tell, where they can be ``compared`` with the last.
+    """Fill the log-odds of slip of the ``evidence`` by forces, where they can be ``compared`` with the last.
 
     ``noise``: interval s, variance of a marker coordinate m², and deviation of an element's force N.
     """
     interval, _, force_noise = noise
     if held:
-        keep_ratios(elements, places, after.elements, told.log_odds)
+        keep_ratios(elements, places, after.elements, evidence.log_odds)
     elif compared:
-        weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
+        weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, evidence)
     else:
-        told.log_odds[:] = 0.0
+        evidence.log_odds[:] = 0.0
 
 
 @compiled
@@ -255,7 +255,7 @@ def known_or(noise: float, otherwise: float) -> float:
 @compiled(inline=True)
 def rooms_of(
     rows: FloatArray, count: int
-) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, ToldByForces, Measurements, Estimates]:
+) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, ForceEvidence, Measurements, Estimates]:
     """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
     change of force [3, n·m], what forces tell, what the step brings, and both states.
 
@@ -266,7 +266,7 @@ def rooms_of(
         rows[4][:count], rows[5][:count], rows[6][:count], rows[7][:count],
     )  # fmt: skip
     motion = AnchorMotion(rows[8][:count], rows[9][:count], rows[10][:count])
-    told = ToldByForces(rows[15][:count], rows[16][:count], rows[12][:count], rows[13][:count], rows[14][:count])
+    evidence = ForceEvidence(rows[15][:count], rows[16][:count], rows[12][:count], rows[13][:count], rows[14][:count])
     # stick and weights of anchors are done with once the load has been looked at, their markers once places are known
     seen = Measurements(
         rows[5][:count], rows[6][:count], rows[7][:count], rows[11][:count],
@@ -276,7 +276,7 @@ def rooms_of(
         rows[17][:count], rows[0][:count], rows[1][:count], rows[2][:count],
         rows[3][:count], rows[4][:count], rows[16][:count],
     )  # fmt: skip
-    return anchors, motion, rows[11][:count], rows[12:15], told, seen, states
+    return anchors, motion, rows[11][:count], rows[12:15], evidence, seen, states
 
 
 @compiled

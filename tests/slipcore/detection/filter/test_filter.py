@@ -8,7 +8,7 @@ from slipcore import FilterOptions, GraspLog, SlipDetector, SlipHistory, detect_
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter import state
 from slipcore.detection.filter.element import Estimates, Increment, Measurements, update_elements
-from slipcore.detection.filter.force_ratio import ToldByForces, find_ratio_log_odds
+from slipcore.detection.filter.force_ratio import ForceEvidence, find_ratio_log_odds
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, find_pose, place_of_object, place_on_object, pose_at
 from slipcore.detection.filter.tuning import Tuning, settings_of
 
@@ -76,9 +76,9 @@ def test_a_fitted_pose_is_the_motion_of_what_sticks_though_a_third_slips() -> No
 
 def test_evidence_of_a_force_ratio_rises_to_the_one_that_slips() -> None:
     tuning = TUNING._replace(ratio_spread=0.1, ratio_difference=0.15)
-    told = ToldByForces(np.empty(4), np.full(4, 1e-4), np.array([0.1, 0.25, 0.4, 0.5]), np.zeros(4), np.zeros(4))
-    find_ratio_log_odds(told, 0.4, 0.03, tuning)
-    evidence = told.log_odds
+    found = ForceEvidence(np.empty(4), np.full(4, 1e-4), np.array([0.1, 0.25, 0.4, 0.5]), np.zeros(4), np.zeros(4))
+    find_ratio_log_odds(found, 0.4, 0.03, tuning)
+    evidence = found.log_odds
     assert evidence[0] < evidence[1] < 0.0 < evidence[2] <= evidence[3]
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.force_ratio import (
-    ToldByForces,
+    ForceEvidence,
     find_ratio_log_odds,
     follow_forces,
     keep_ratios,
@@ -42,9 +42,9 @@ TUNING = Tuning(*settings_of(FilterOptions()))._replace(
 
 
 def log_odds(ratio: float, noise: float, own: float, known: float, friction: float, gain: float) -> float:
-    told = ToldByForces(*np.array([[np.nan], [noise], [ratio], [own], [known]]))
-    unwrap(find_ratio_log_odds)(told, friction, gain, TUNING)
-    return float(told.log_odds[0])
+    evidence = ForceEvidence(*np.array([[np.nan], [noise], [ratio], [own], [known]]))
+    unwrap(find_ratio_log_odds)(evidence, friction, gain, TUNING)
+    return float(evidence.log_odds[0])
 
 
 def test_a_ratio_tells_of_slip_by_the_ratio_of_two_densities() -> None:
@@ -72,9 +72,9 @@ def test_the_ratio_at_which_an_element_slips_moves_its_limit_from_that_of_all() 
     assert found == pytest.approx(np.log(slip / stick), rel=1e-9)
 
 
-def untold() -> ToldByForces:
+def no_evidence() -> ForceEvidence:
     """Room for what the forces on three elements say."""
-    return ToldByForces(*np.full((5, 3), 9.0))
+    return ForceEvidence(*np.full((5, 3), 9.0))
 
 
 def elements(**rows: float) -> np.ndarray:
@@ -102,29 +102,29 @@ def test_forces_are_low_passed_where_contact_stays_and_begin_anew_elsewhere() ->
 
 
 def test_while_nothing_happens_ratios_stay() -> None:
-    old, new, told = elements(RATIO=0.3, RATIO_WEIGHT=2.0), elements(), np.ones(3)
-    unwrap(keep_ratios)(old, PLACES, new, told)
-    assert not told.any()
+    old, new, evidence = elements(RATIO=0.3, RATIO_WEIGHT=2.0), elements(), np.ones(3)
+    unwrap(keep_ratios)(old, PLACES, new, evidence)
+    assert not evidence.any()
     assert new[RATIO].tolist() == [[0.3, 0.3], [0.3, 0.0]]
     assert new[RATIO_WEIGHT].tolist() == [[2.0, 2.0], [2.0, 0.0]]
 
 
 def test_ratios_are_learnt_from_what_likely_slips_under_enough_force() -> None:
     """Probabilities of 0.95, 0.85 and 0.95, of which the last bears too little; ratios of 0.5, 0.3 and 0.9."""
-    old, new, told = elements(RATIO=1.0, RATIO_WEIGHT=2.0), elements(), untold()
+    old, new, evidence = elements(RATIO=1.0, RATIO_WEIGHT=2.0), elements(), no_evidence()
     old[PROBABILITY] = [[0.95, 0.85], [0.95, 0.0]]
     new[NORMAL], new[TANGENTIAL] = [[1.0, 1.0], [0.1, 0.0]], [[0.5, 0.3], [0.09, 0.0]]
-    total, weight = unwrap(learn_ratios)(old, PLACES, 0.01, 0.1, 0.25, TUNING, new, told)
+    total, weight = unwrap(learn_ratios)(old, PLACES, 0.01, 0.1, 0.25, TUNING, new, evidence)
     variance = 0.01 * np.array([1.25, 1.09, 0.0])
-    np.testing.assert_allclose(told.variance, variance)
-    assert told.ratio.tolist() == [0.5, 0.3, 0.0]
+    np.testing.assert_allclose(evidence.variance, variance)
+    assert evidence.ratio.tolist() == [0.5, 0.3, 0.0]
     of_all = np.array([0.95**2, 0.85**2]) / (0.01 + variance[:2])
     assert total == pytest.approx(of_all @ [0.5, 0.3])
     assert weight == pytest.approx(of_all.sum())
     own = 0.25 / (0.04 + variance[0])
     np.testing.assert_allclose(new[RATIO], [[0.75 + 0.5 * own, 0.75], [0.75, 0.0]])
     np.testing.assert_allclose(new[RATIO_WEIGHT], [[1.5 + own, 1.5], [1.5, 0.0]])
-    for kept, row in ((told.seen, RATIO), (told.weight, RATIO_WEIGHT)):
+    for kept, row in ((evidence.seen, RATIO), (evidence.weight, RATIO_WEIGHT)):
         assert kept.tolist() == [new[row, i, j] for i, j in PLACES]
 
 
@@ -137,32 +137,32 @@ def test_ratios_count_above_so_many_deviations_of_a_low_passed_force() -> None:
         ratio_least_force=0.1, ratio_limit=6.0, ratio_weight=0.8,
     )  # fmt: skip
     for normal, counts in ((1.72, False), (1.75, True)):
-        old, new, common, told = elements(), elements(), np.zeros(COMMON), untold()
+        old, new, common, evidence = elements(), elements(), np.zeros(COMMON), no_evidence()
         new[NORMAL, 0, 0], new[TANGENTIAL, 0, 0] = normal, 0.5 * normal
         common[FRICTION : FRICTION + 2] = 40.0, 100.0
-        unwrap(weigh_forces)(old, PLACES, 0.3, 1.0, tuning, new, common, told)
+        unwrap(weigh_forces)(old, PLACES, 0.3, 1.0, tuning, new, common, evidence)
         variance = 0.09 / 3.0 * 1.25 / normal**2
-        assert told.variance.tolist() == [pytest.approx(variance) if counts else 0.0, 0.0, 0.0]
+        assert evidence.variance.tolist() == [pytest.approx(variance) if counts else 0.0, 0.0, 0.0]
         expected = log_odds(0.5, variance, 0.0, 0.0, 0.4, 1.0 / 3.0)
-        assert told.log_odds[0] == (pytest.approx(0.8 * 0.5 * expected) if counts else 0.0)
+        assert evidence.log_odds[0] == (pytest.approx(0.8 * 0.5 * expected) if counts else 0.0)
         np.testing.assert_allclose(common[FRICTION : FRICTION + 2], [80.0 / 3.0, 200.0 / 3.0])
 
 
 def test_a_force_against_the_motion_is_no_friction_of_slip() -> None:
     """After a load is turned back ratios are still those of slip: they speak for stick, and are not learnt."""
-    old, new, common, told = elements(), elements(NORMAL=1.0, TANGENTIAL=0.4), np.zeros(COMMON), untold()
+    old, new, common, evidence = elements(), elements(NORMAL=1.0, TANGENTIAL=0.4), np.zeros(COMMON), no_evidence()
     old[PROBABILITY] = 0.95
     new[OPPOSED, 0, 1] = 1.0
     common[FRICTION : FRICTION + 2] = 40.0, 100.0
-    unwrap(weigh_forces)(old, PLACES, 1e-3, 1.0, TUNING, new, common, told)
-    along, opposed, other = told.log_odds
+    unwrap(weigh_forces)(old, PLACES, 1e-3, 1.0, TUNING, new, common, evidence)
+    along, opposed, other = evidence.log_odds
     assert along == other > 0.0 > opposed
     assert new[RATIO_WEIGHT, 0, 1] == 0.0 < new[RATIO_WEIGHT, 0, 0]
-    total, weight = unwrap(learn_ratios)(old, PLACES, 1e-6, 0.1, 1.0, TUNING, new, told)
+    total, weight = unwrap(learn_ratios)(old, PLACES, 1e-6, 0.1, 1.0, TUNING, new, evidence)
     assert total / weight == pytest.approx(0.4)
 
 
 def test_without_a_known_friction_ratios_say_nothing() -> None:
-    new, told = elements(NORMAL=1.0, TANGENTIAL=0.5), untold()
-    unwrap(weigh_forces)(elements(), PLACES, 0.01, 1.0, TUNING, new, np.zeros(COMMON), told)
-    assert not told.log_odds.any()
+    new, evidence = elements(NORMAL=1.0, TANGENTIAL=0.5), no_evidence()
+    unwrap(weigh_forces)(elements(), PLACES, 0.01, 1.0, TUNING, new, np.zeros(COMMON), evidence)
+    assert not evidence.log_odds.any()

@@ -97,11 +97,11 @@ def test_places_are_those_that_stay_and_have_a_state_row_by_row() -> None:
 
 def test_rows_are_shared_out_to_as_many_anchors() -> None:
     rows = np.arange(18.0)[:, None] + 0.1 * np.arange(4)
-    anchors, motion, deeper, change, told, seen, states = unwrap(rooms_of)(rows, 3)
+    anchors, motion, deeper, change, evidence, seen, states = unwrap(rooms_of)(rows, 3)
     assert [each[1] for each in anchors] == pytest.approx([0.1, 1.1, 2.1, 3.1, 4.1, 5.1, 6.1, 7.1])
     assert [each[0] for each in motion] == [8.0, 9.0, 10.0]
     assert (deeper[2], len(deeper), change.shape, change[0, 0]) == (11.2, 3, (3, 4), 12.0)
-    assert [each[0] for each in told] == [15.0, 16.0, 12.0, 13.0, 14.0]
+    assert [each[0] for each in evidence] == [15.0, 16.0, 12.0, 13.0, 14.0]
     assert [each[0] for each in seen] == [5.0, 6.0, 7.0, 11.0, 15.0, 12.0, 13.0, 14.0]
     assert [each[0] for each in states] == [17.0, 0.0, 1.0, 2.0, 3.0, 4.0, 16.0]
 
@@ -109,11 +109,11 @@ def test_rows_are_shared_out_to_as_many_anchors() -> None:
 def test_what_is_used_at_a_time_shares_no_rows() -> None:
     """The fit of the pose beside the change of force, the evidence of forces, and the states beside what is seen."""
     rows = np.arange(18.0)[:, None] + np.zeros(2)
-    anchors, motion, deeper, change, told, seen, states = unwrap(rooms_of)(rows, 2)
+    anchors, motion, deeper, change, evidence, seen, states = unwrap(rooms_of)(rows, 2)
     markers = anchors.x, anchors.y, anchors.marker_x, anchors.marker_y, seen.x, seen.y, seen.share
     for together in (
         (*anchors, *motion, deeper, *change),
-        (*anchors[:5], *motion, *told),
+        (*anchors[:5], *motion, *evidence),
         (*markers, *motion, seen.readiness, seen.by_force),
         (*seen, *states, *motion),
     ):
