@@ -142,6 +142,24 @@ def test_nor_does_a_long_one_let_a_new_key_overtake_those_whose_short_jobs_were_
         assert long in served(session)
 
 
+def test_long_jobs_of_a_new_key_wait_a_long_step_for_each_other_while_one_runs_that_began_long_ago(
+    database: Database, paper: int
+) -> None:
+    """Ten short jobs of another key in each, however far behind the turn is in which the one that runs began."""
+    with database.write() as session:
+        runner = runners.add(session, "host:1")
+        add(session, paper, 1, is_long=True)
+        assert jobs.claim(session, runner) is not None
+        add(session, paper, 45, LARGE)
+        for _ in range(20):
+            claim = jobs.claim(session, runner, only_short=True)
+            assert claim is not None
+            jobs.finish(session, claim, "done")
+        long = add(session, paper, 3, SMALL, is_long=True)
+        order = served(session)
+        assert [order.index(job) for job in long] == [0, 11, 22]
+
+
 @pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
 def test_a_claim_does_not_wait_for_a_merge(database: Database, paper: int) -> None:
     """It would, with a job's row locked for which the merge waits in turn."""
