@@ -284,7 +284,7 @@ def _newton(
     cells, q, p = np.empty((FIELDS, radius.size)), traction.reshape(2, -1), trial.reshape(2, -1)
     inverse_gram = survey((q, slip.reshape(2, -1), radius, stiffness), (arm, given), cells)
     space, onto_circle = (cells[:3], arm, inverse_gram, cells[5], cells[6]), cells[3:5].reshape(traction.shape)
-    bounds = stiffness, negligible, _REDUCTION, _ITERATIONS
+    bounds = stiffness, negligible, _REDUCTION, int(_ITERATIONS)  # a literal would be a type of its own, compiled anew
     move, taken = newton_move(space, (traction, slip, onto_circle), target, by, bounds)
     point = np.empty_like(q)
     outward(q, move.reshape(2, -1), cells[6], point)

@@ -20,9 +20,14 @@ def found_of(force: FloatArray, contact: FloatArray = MIDDLE, known: Lasting = W
     place = np.zeros(force.shape)
     place[..., :2] = 1e-3 * np.stack(np.meshgrid(*(np.arange(length) for length in contact.shape), indexing="ij"), -1)
     spans = one_patch(np.broadcast_to(contact, force.shape[:3]))
-    return noise_of_sums(
-        np.arange(len(force)) / 30.0, force, np.broadcast_to(UP, force.shape), place, spans, 0.5, known
-    )
+    time, force = as_of_a_log(np.arange(len(force)) / 30.0), as_of_a_log(force)
+    return noise_of_sums(time, force, np.broadcast_to(UP, force.shape), place, spans, 0.5, known)
+
+
+def as_of_a_log(values: FloatArray) -> FloatArray:
+    """Read-only: kernels are compiled for these, and would be anew for others, in four seconds."""
+    values.setflags(write=False)
+    return values
 
 
 def test_noise_of_sums_is_told_apart_across_the_normal_and_along_it() -> None:
@@ -30,6 +35,7 @@ def test_noise_of_sums_is_told_apart_across_the_normal_and_along_it() -> None:
     force = np.array([0.3, 0.0, -1.0]) + random.standard_normal((2000, 3, 3, 3)) * np.array([0.01, 0.02, 0.05])
     place = np.zeros(force.shape)
     spans = one_patch(np.ones((2000, 3, 3), bool))
+    time, force = as_of_a_log(time), as_of_a_log(force)
     found = noise_of_sums(time, force, np.broadcast_to(UP, force.shape), place, spans, 0.0).noise
     np.testing.assert_allclose(found[[0, -1]], [[0.02, 0.05]] * 2, rtol=0.1)
 
@@ -43,9 +49,8 @@ def test_elements_that_come_and_go_are_no_noise_of_sums() -> None:
     place[..., :2] = 1e-3 * np.stack(np.meshgrid(np.arange(7.0), np.arange(9.0)), axis=-1)
     contact = np.ones((300, 9, 7), bool)
     contact[np.arange(300) % 3 > 0, 0] = False
-    found = noise_of_sums(
-        np.arange(300) / 60.0, force, np.broadcast_to(UP, force.shape), place, one_patch(contact), 0.0
-    ).noise
+    time, force = as_of_a_log(np.arange(300) / 60.0), as_of_a_log(force)
+    found = noise_of_sums(time, force, np.broadcast_to(UP, force.shape), place, one_patch(contact), 0.0).noise
     np.testing.assert_allclose(found[0], 1e-3, rtol=0.15)
 
 
@@ -101,7 +106,7 @@ def test_changes_are_those_of_elements_that_are_free_in_three_frames() -> None:
     force, labels = random.standard_normal((9, 4, 5, 3)), np.full((9, 4, 5), -1)
     labels[1, 0, 0] = labels[4, 1, 1] = labels[7, 2, 2] = labels[5, 3, 3] = 0
     off = np.ones((4, 5, 3))
-    _find_changes(force, labels, 4, 3, 0.25, off)
+    _find_changes(as_of_a_log(force), labels, 4, 3, 0.25, off)
     expected = force[4] - 0.75 * force[1] - 0.25 * force[7]
     for place in ((0, 0), (1, 1), (2, 2)):
         expected[place] = 0.0

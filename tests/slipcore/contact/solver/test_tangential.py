@@ -153,7 +153,7 @@ def test_fused_loops_of_a_newton_round_are_what_numpy_makes_of_them() -> None:
     assert compiled._slides(traction, slip, np.where(slides, limit, 0.0), 0.7, slides)
     way, response = point, offset
     sums = (slip * way).sum(), (way * response).sum(), (np.hypot(*slip) * limit).sum()
-    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit), sums, rtol=1e-12)
+    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit.ravel()), sums, rtol=1e-12)
 
 
 def test_the_extent_and_the_limits_of_a_contact_are_found_at_once() -> None:
