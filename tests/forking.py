@@ -74,12 +74,19 @@ def begin() -> None:
 
 def exit_code(target: Callable[..., object], *given: object, seconds: float = 120.0) -> int | None:
     """Of a process that does this; ``seconds`` are only against waiting for ever."""
-    process = Context().Process(target=target, args=given)
-    process.start()
-    process.join(seconds)
-    process.kill()
-    process.join()
-    return process.exitcode
+    return exit_codes((target, *given), seconds=seconds)[0]
+
+
+def exit_codes(*jobs: tuple[Any, ...], seconds: float = 240.0) -> list[int | None]:
+    """Of processes that run at once, each of which does a job: what to call, and with what."""
+    processes = [Context().Process(target=target, args=given) for target, *given in jobs]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join(seconds)
+        process.kill()
+        process.join()
+    return [process.exitcode for process in processes]
 
 
 def start_module(command: tuple[str, ...], environment: dict[str, str], log: Path) -> BaseProcess:

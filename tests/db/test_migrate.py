@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, replace
@@ -45,6 +43,7 @@ from db.repositories import (
     stores,
 )
 from db.tables import Base, DetectionRow, GraspLogRow, MaterialOwnerRow, SensorRow, now
+from tests import forking
 
 pytestmark = pytest.mark.usefixtures("real_migrations")
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -327,8 +326,7 @@ def test_upgrading_again_changes_nothing(database: Database) -> None:
 @pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
 def test_servers_that_start_at_once_upgrade_once(empty_database: Database) -> None:
     upgrade = f"from db import database, migrate; migrate.upgrade(database.Database({empty_database.url!r}))"
-    servers = [subprocess.Popen([sys.executable, "-c", upgrade]) for _ in range(3)]
-    assert [server.wait(timeout=240) for server in servers] == [0, 0, 0]
+    assert forking.exit_codes(*[(exec, upgrade, {})] * 3) == [0, 0, 0]
     assert migrate.check(empty_database) is None
 
 

@@ -3,7 +3,6 @@
 import sqlite3
 import struct
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from db.database import Database
 from db.errors import StorageUnavailable
 from db.migrate import upgrade
 from db.write_ahead_log import headers
+from tests import forking
 from tests.db.looks import header_of, look
 
 pytestmark = pytest.mark.usefixtures("without_pauses")
@@ -245,8 +245,8 @@ from contextlib import closing
 from db.database import Database
 from db.repositories import stores
 
-path, seed = sys.argv[1:]
-draw = random.Random(int(seed))
+sys.stderr = open(f"{path}-errors-{seed}", "w", buffering=1)
+draw = random.Random(seed)
 for _ in range(4):
     with closing(Database("sqlite:///" + path)) as database:
         for _ in range(60):
@@ -267,10 +267,9 @@ def test_processes_that_work_on_one_file_find_no_fault_with_each_other(tmp_path:
     """However they write, begin the log anew, open and close."""
     path = tmp_path / NAME
     opened(path).close()
-    command = [sys.executable, "-c", HAMMER, str(path)]
-    processes = [subprocess.Popen([*command, str(seed)], stderr=subprocess.PIPE, text=True) for seed in range(3)]
-    errors = [process.communicate(timeout=120)[1] for process in processes]
-    assert ([process.returncode for process in processes], errors) == ([0] * 3, [""] * 3)
+    codes = forking.exit_codes(*((exec, HAMMER, {"path": str(path), "seed": seed}) for seed in range(3)))
+    errors = [Path(f"{path}-errors-{seed}").read_text() for seed in range(3)]
+    assert (codes, errors) == ([0] * 3, [""] * 3)
 
 
 def test_a_log_that_ends_in_the_middle_of_a_frame_is_read_up_to_there(tmp_path: Path) -> None:
