@@ -60,14 +60,13 @@ if has_room(MEMORY, FOLDERS):  # SQLite waits 4 to 10 ms for a disk in each tran
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collect no garbage while tests are collected, a fifth of the time that it takes, and leave what was imported out
-    of later collections, which were a fifth of the time of some tests.
+    """Collect no garbage while tests are collected, a fifth of the time that it takes, and leave what there is then
+    out of later collections, which were a fifth of the time of some tests. To look for garbage in it takes a second.
     """
     gc.disable()
     try:
         return (yield)
     finally:
-        gc.collect()
         gc.freeze()
         gc.set_threshold(*GARBAGE)
         gc.enable()

@@ -7,8 +7,6 @@ import pytest
 
 from stiction_client import CoulombFriction, FrictionModel, InvalidArgument, drake_friction
 
-drake = pytest.importorskip("pydrake.all", reason="drake is not installed")
-
 Make = Callable[..., FrictionModel]
 
 FORCE = 0.1
@@ -19,6 +17,7 @@ AHEAD, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 def speed(foot: CoulombFriction, floor: CoulombFriction, pull: float) -> float:
     """m/s of a round foot after 1 s on a floor, pulled by ``pull`` of its weight, unable to turn; a discrete plant."""
+    drake = pytest.importorskip("pydrake.all", reason="drake is not installed")  # takes half a second to load
     builder = drake.DiagramBuilder()
     plant, _ = drake.AddMultibodyPlantSceneGraph(builder, 1e-3)
     rail = plant.AddRigidBody("rail", drake.SpatialInertia.SolidSphereWithMass(1e-3, 0.01))

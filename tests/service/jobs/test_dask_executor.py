@@ -13,7 +13,6 @@ from typing import Any
 
 import httpx
 import pytest
-from distributed import Client
 
 from db.database import Database
 from db.errors import DriverMissing
@@ -48,13 +47,18 @@ class Cluster:
 
     def has_work(self) -> bool:
         """Whether a worker has been told to do something."""
-        with Client(self.address, set_as_default=False) as client:
+        with self._client() as client:
             return any(client.processing().values())
 
     def is_idle(self) -> bool:
         """Whether the results of all that was done have been fetched from the workers, too."""
-        with Client(self.address, set_as_default=False) as client:
+        with self._client() as client:
             return not client.who_has()
+
+    def _client(self) -> Any:
+        from distributed import Client  # takes half a second to load
+
+        return Client(self.address, set_as_default=False)
 
     def _start(self, what: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *options, "--no-dashboard"]
