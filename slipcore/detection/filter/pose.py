@@ -185,34 +185,55 @@ def _without_open_yaw(
 
 @compiled
 def object_motion(
-    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float, motion: AnchorMotion
+    anchors: Anchors,
+    reference: Pose,
+    before: Pose,
+    pose: Pose,
+    spread: PoseVariance,
+    play: float,
+    motion: AnchorMotion,
 ) -> Pose:
     """Fill the ``motion`` of each anchor; the reference of the next step.
 
     A fitted pose jitters though nothing moves. What it strays from the ``reference`` by less than ``play`` standard
     deviations (root mean square over the anchors) is no motion; the rest is, and takes the reference with it: motion
     = (1 − ``play`` √(Σσ²/Σd²)) d for distances d of variance σ², as in positive-part shrinkage. So all of a long motion
-    counts, however many frames it is cut into, and of a jitter nothing.
+    counts, however many frames it is cut into, and of a jitter nothing. Nor does what the pose had strayed ``before``
+    this step, when it was less sure: markers have shown already where that took them, and show no motion now.
     """
     count = len(anchors.x)
-    pose, spread = _without_open_yaw(anchors, reference, pose, spread, play)
-    cosine, sine = pose.cosine, pose.sine
+    if count == 0:  # what moves without touching carries nothing
+        return pose
     strayed = jitter = 0.0
+    held, _ = _without_open_yaw(anchors, reference, before, spread, play)
+    pose, spread = _without_open_yaw(anchors, reference, pose, spread, play)
+    for e in range(count):
+        px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
+        bx, by = place_of_object(held, anchors.x[e], anchors.y[e])
+        rx, ry = place_of_object(reference, anchors.x[e], anchors.y[e])
+        motion.variance[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
+        strayed += (bx - rx) ** 2 + (by - ry) ** 2
+        jitter += motion.variance[e]
+    reference = between(reference, held, beyond(strayed, jitter, play))
+    strayed = 0.0
+    cosine, sine = pose.cosine, pose.sine
     for e in range(count):
         px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
         rx, ry = place_of_object(reference, anchors.x[e], anchors.y[e])
-        motion.variance[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
         dx, dy = px - rx, py - ry
         motion.x[e], motion.y[e] = cosine * dx + sine * dy, cosine * dy - sine * dx
         strayed += dx * dx + dy * dy
-        jitter += motion.variance[e]
-    share = max(0.0, 1.0 - play * math.sqrt(jitter / strayed)) if strayed > 0.0 else 0.0
+    share = beyond(strayed, jitter, play)
     for e in range(count):
         motion.x[e] *= share
         motion.y[e] *= share
-    if count == 0:  # what moves without touching carries nothing
-        return pose
     return between(reference, pose, share)
+
+
+@compiled
+def beyond(strayed: float, jitter: float, play: float) -> float:
+    """Share of what a pose strayed that is more than ``play`` times its jitter; sums of squares, m²."""
+    return max(0.0, 1.0 - play * math.sqrt(jitter / strayed)) if strayed > 0.0 else 0.0
 
 
 @compiled

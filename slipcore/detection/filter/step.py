@@ -93,7 +93,7 @@ def step_elements(
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)
-    move_anchors(anchors, pose, spread, held, tuning, motion, common)
+    move_anchors(anchors, stored_pose(before.common, POSE), pose, spread, held, tuning, motion, common)
     compared = has_force and last.force.size > 0 and len(places) > 0
     change = change if compared else change[:0]
     force_change(places, last.force, frame.force, change)
@@ -131,6 +131,7 @@ def tell_noise(surface: Surface, tuning: Tuning, common: FloatArray) -> float:
 @compiled(inline=True)
 def move_anchors(
     anchors: Anchors,
+    last: Pose,
     pose: Pose,
     spread: PoseVariance,
     held: bool,
@@ -138,8 +139,10 @@ def move_anchors(
     motion: AnchorMotion,
     common: FloatArray,
 ) -> None:
-    """Fill the ``motion`` of anchors from the pose that ``common`` refers to; none, and no other pose, where held."""
-    reference = object_motion(anchors, stored_pose(common, REFERENCE), pose, spread, tuning.motion_play, motion)
+    """Fill the ``motion`` of anchors from the pose that ``common`` refers to, the ``last`` one and that of now; none,
+    and no other pose to refer to, where held.
+    """
+    reference = object_motion(anchors, stored_pose(common, REFERENCE), last, pose, spread, tuning.motion_play, motion)
     if held:
         motion.x[:] = 0.0
         motion.y[:] = 0.0

@@ -85,7 +85,7 @@ def test_of_a_motion_is_left_what_its_jitter_does_not_explain(moved: float, kept
     """(1 − √(Σσ²/Σd²)) d, for a deviation of 2 µm and a play of one deviation."""
     places, motion = anchors(0.0, 1.0), AnchorMotion(*np.empty((3, 16)))
     start, end, spread = pose_at(0.0, 0.0, 0.0, 1.0), pose_at(moved, 0.0, 0.0, 1.0), PoseVariance(4e-12, 0.0, 0.0, 0.0)
-    reference = object_motion(places, start, end, spread, 1.0, motion)
+    reference = object_motion(places, start, start, end, spread, 1.0, motion)
     np.testing.assert_allclose(motion.x, kept * moved, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(motion.variance, 4e-12, rtol=1e-12)
     assert reference.x == pytest.approx(kept * moved, rel=1e-9, abs=1e-15)
@@ -105,7 +105,7 @@ def test_a_yaw_that_few_markers_leave_open_is_held_and_hides_no_motion(
     start, turned = pose_at(0.0, 0.0, 0.0, 1.0), pose_at(0.0, 0.0, turn, 1.0)
     x, y = place_of_object(turned, 5e-3, 5e-3)
     end = pose_at(5e-3 + 20e-6 - x, 5e-3 - y, turn, 1.0)  # the corner moves along x
-    reference = object_motion(places, start, end, spread, 1.0, motion)
+    reference = object_motion(places, start, start, end, spread, 1.0, motion)
     if held:
         np.testing.assert_allclose(motion.x, 0.9 * 20e-6, rtol=1e-4)
         np.testing.assert_allclose(motion.y, 0.0, rtol=0, atol=1e-7)
@@ -114,3 +114,28 @@ def test_a_yaw_that_few_markers_leave_open_is_held_and_hides_no_motion(
     else:
         assert np.ptp(motion.variance) > 0.0
         assert reference.yaw != 0.0 or not motion.x.any()
+
+
+def test_what_a_pose_strayed_while_it_was_unsure_is_no_motion_once_it_is_known() -> None:
+    """It lay 30 µm off when that was within its deviation; now it is known to 2 µm, and has moved by 5 µm more."""
+    places, motion = anchors(0.0, 1.0), AnchorMotion(*np.empty((3, 16)))
+    start, before, end = (pose_at(x, 0.0, 0.0, 1.0) for x in (0.0, 30e-6, 35e-6))
+    spread = PoseVariance(4e-12, 0.0, 0.0, 0.0)
+    reference = object_motion(places, start, before, end, spread, 1.0, motion)
+    np.testing.assert_allclose(motion.x, 5e-6, rtol=1e-9)
+    assert reference.x == pytest.approx(33e-6, rel=1e-9)  # and lags by a deviation, as ever
+    object_motion(places, start, before, before, spread, 1.0, motion)
+    np.testing.assert_allclose(motion.x, 0.0, rtol=0, atol=1e-15)
+
+
+def test_of_a_long_motion_all_but_one_play_counts_however_many_frames_it_is_cut_into() -> None:
+    spread, total = PoseVariance(4e-12, 0.0, 0.0, 0.0), 100e-6
+    for frames in (1, 10, 1000):
+        reference = before = pose_at(0.0, 0.0, 0.0, 1.0)
+        moved = 0.0
+        for x in np.linspace(0.0, total, frames + 1)[1:]:
+            places, motion = anchors(0.0, 1.0), AnchorMotion(*np.empty((3, 16)))
+            pose = pose_at(x, 0.0, 0.0, 1.0)
+            reference = object_motion(places, reference, before, pose, spread, 3.0, motion)
+            moved, before = moved + motion.x[0], pose
+        assert moved == pytest.approx(total - 6e-6, rel=1e-9)
