@@ -1,5 +1,9 @@
 """What callers may pass: numbers, and arrays of them, within their range."""
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from stiction_client.elementwise import Number
@@ -21,6 +25,23 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     if wrong.any():
         raise InvalidArgument(name, float(numbers[wrong][0]), _range(low, high, unit))
     return numbers if numbers.ndim else float(numbers)
+
+
+def for_json(name: str, value: object) -> Any:
+    """``value`` of plain numbers, text, lists and objects, numpy's among them; raises ``InvalidArgument`` naming what
+    JSON does not have.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): for_json(str(key), each) for key, each in value.items()}
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [for_json(name, each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidArgument(name, value, "a finite number")
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise InvalidArgument(name, _shown(value), "numbers, text, and lists and objects of these")
 
 
 def _range(low: float, high: float, unit: str) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from stiction_client import container, json_values, problems
+from stiction_client.arguments import for_json
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
     AnswerTooLarge,
@@ -91,7 +92,7 @@ def upload(
         detector=detector,
         scale=scale,
         frame_rate=frame_rate,
-        mapping=mapping if mapping is None or isinstance(mapping, str) else json.dumps(mapping),
+        mapping=mapping if mapping is None or isinstance(mapping, str) else json.dumps(for_json("mapping", mapping)),
         rest=rest,
     )
     request = Request("POST", "/v1/grasp-logs", params, content=content, content_type=content_type)
@@ -351,6 +352,8 @@ def audit(actor: str | None, action: str | None, subject: str | None, limit: int
 
 def wait(job_id: str, timeout: float) -> Call[Job]:
     """Ask for a job until it has ended; the service keeps its answer back that long, unless it is an older one."""
+    if math.isnan(timeout):
+        raise InvalidArgument("timeout", timeout, "a number of seconds")
     deadline = time.monotonic() + timeout
     pause = FIRST_POLL
     while True:
@@ -408,6 +411,8 @@ def _require_same(asked: Mapping[str, str | float], answer: Any) -> None:
 
 def _body(log: GraspLogLike | Path | str) -> tuple[bytes, str]:
     if not isinstance(log, str | Path):
+        if not hasattr(log, "displacement"):
+            raise InvalidArgument("log", type(log).__name__, "a grasp log, a file, or a recording folder")
         return container.encode(log), container.CONTENT_TYPE
     path = Path(log)
     if path.is_dir():
@@ -419,6 +424,8 @@ def _grasp(grasp: Any) -> dict[str, Any]:
     """A stored log by its id, or the friction samples of any object that has them."""
     if isinstance(grasp, GraspLogReceipt | str):
         return {"grasp_log": grasp if isinstance(grasp, str) else grasp.id}
+    if not hasattr(grasp, "friction_coefficient"):
+        raise InvalidArgument("grasp", type(grasp).__name__, "a receipt, a log's id, or samples as slipcore gives them")
     arrays = {name: np.asarray(getattr(grasp, name)) for name in SAMPLE_ARRAYS}
     for name, array in arrays.items():
         if not np.isfinite(array).all():

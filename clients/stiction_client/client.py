@@ -13,7 +13,7 @@ from typing import Any, Self
 import httpx
 
 from stiction_client import calls, head_timeout
-from stiction_client.arguments import within
+from stiction_client.arguments import for_json, within
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import AnswerTooLarge, ConnectionFailed, InvalidArgument
 from stiction_client.exchange import Call, Ended, Pause, Reply, Request, T, advance
@@ -612,7 +612,7 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
             request.method,
             request.path,
             params=dict(request.params),
-            json=request.json,
+            json=for_json("body", request.json),
             content=request.content,
             headers=headers,
             timeout=httpx.Timeout(**http.timeout.as_dict() | {"read": answered_within}),
@@ -650,5 +650,5 @@ def _gel(
         "marker_depth": marker_depth,
     }
     if relative_thickness is not None:  # which older services do not know
-        gel["relative_thickness"] = [list(map(float, row)) for row in relative_thickness]
+        gel["relative_thickness"] = relative_thickness
     return gel

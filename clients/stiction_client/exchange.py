@@ -210,7 +210,7 @@ def without_none(**params: str | float | None) -> dict[str, str | float]:
 
 
 def segment(text: str) -> str:
-    """One segment of a path; a name of dots or nothing would lead to another route."""
-    if not text.strip("."):
+    """One segment of a path; a name of dots or nothing would lead to another route, and None is no name."""
+    if not isinstance(text, str) or not text.strip("."):
         raise InvalidArgument("name", repr(text), "a letter or digit, then letters, digits, space, '.', '_' or '-'")
     return quote(text, safe="")

@@ -1,12 +1,13 @@
 """What callers may pass: a number, or many, within their range."""
 
+import json
 from typing import Any
 
 import numpy as np
 import pytest
 
 from stiction_client import InvalidArgument
-from stiction_client.arguments import within
+from stiction_client.arguments import for_json, within
 
 
 @pytest.mark.parametrize("value", [1, 1.0, np.float64(1.0), np.int32(1), np.array(1.0), np.float32(1.0)])
@@ -60,3 +61,14 @@ def test_what_is_no_number_is_told_as_such(value: Any) -> None:
 def test_whole_numbers_beyond_those_of_a_float_are_rounded(value: int, is_exact: bool) -> None:
     found = within("count", value, 0.0, 1e300)
     assert (int(found) == value) is is_exact
+
+
+def test_numbers_and_arrays_of_numpy_are_sent_as_plain_ones() -> None:
+    body = {"seed": np.int64(3), "load": np.float32(2.0), "rows": np.ones((1, 2)), "pair": (np.bool_(True), None)}
+    assert json.dumps(for_json("body", body)) == '{"seed": 3, "load": 2.0, "rows": [[1.0, 1.0]], "pair": [true, null]}'
+
+
+@pytest.mark.parametrize("value", [np.nan, [1.0, np.inf], np.array([[1.0, -np.inf]]), {1, 2}, b"a", object(), 1j])
+def test_what_json_does_not_have_is_refused_by_name(value: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^thickness is .*; allowed: (a finite number|numbers, text)"):
+        for_json("body", {"gel": {"thickness": value}})

@@ -625,8 +625,8 @@ def test_an_entry_that_is_too_large_by_itself_is_an_error(
         ask(server, "materials")
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "..."])
-def test_a_name_that_leads_to_another_route_is_refused_here(ask: Ask, service: Service, name: str) -> None:
+@pytest.mark.parametrize("name", ["", ".", "..", "...", None, 5])
+def test_a_name_that_leads_to_another_route_or_is_none_is_refused_here(ask: Ask, service: Service, name: Any) -> None:
     server = service({})
     with pytest.raises(InvalidArgument, match="name is"):
         ask(server, "material", name)
@@ -1106,3 +1106,31 @@ def test_a_tag_that_cannot_be_sent_back_is_none(answers: SimpleNamespace) -> Non
         client.model("paper")
         client.model("paper")
     assert asked == [None, ""]
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "refused"),
+    [
+        ("describe_sensor", ("left", np.nan, 0.48), "young_modulus is nan; allowed: a finite number"),
+        ("describe_sensor", ("left", 2e5, 0.48, 4e-3, 0.0, [[1.0, np.inf]]), "relative_thickness is inf"),
+        ("calibrate_sensor", ("left", {"g1": np.nan}), "known_force is nan"),
+        ("fit", ("paper", "ols", np.nan), "seed is nan"),
+        ("recognise", ({"friction_coefficient": [0.4]},), "grasp is dict; allowed: a receipt"),
+        ("upload", (None,), "log is NoneType; allowed: a grasp log, a file"),
+        ("wait", ("j1", np.nan), "timeout is nan; allowed: a number of seconds"),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_by_name(
+    ask: Ask, service: Service, call: str, arguments: tuple[Any, ...], refused: str
+) -> None:
+    server = service({})
+    with pytest.raises(InvalidArgument, match=f"^{refused}"):
+        ask(server, call, *arguments)
+    assert not server.requests
+
+
+def test_a_gel_is_described_by_the_numbers_of_an_array(ask: Ask, service: Service) -> None:
+    server = service({})
+    ask(server, "describe_sensor", "left", np.float32(2.5e5), np.float64(0.5), None, 0.0, np.full((1, 2), 0.5))
+    gel = json.loads(server.requests[0].content)
+    assert (gel["young_modulus"], gel["relative_thickness"]) == (250000.0, [[0.5, 0.5]])
