@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -26,30 +27,46 @@ Thing = TypeVar("Thing")
 
 
 class Line:
-    """A line on standard error that is written anew: what is being done, for how long and, once it is told the part
-    is done, for how much longer.
+    """A line on standard error: what is being done, for how long and, once it is told the part is done, for how much
+    longer. It is written anew on a terminal; in a file or a pipe one follows the other, each after twice the time.
     """
 
     def __init__(self, doing: str) -> None:
         self._doing, self._part, self._began, self._said = doing, 0.0, perf_counter(), ""
+        self._is_rewritten, self._next = is_terminal(), 0.0
 
     def tell(self, part: float, doing: str | None = None) -> None:
         """Note which part is done, from 0 to 1, and what is being done by now."""
         self._part, self._doing = part, self._doing if doing is None else doing
 
     def say(self) -> None:
-        """Write the line."""
+        """Write the line, where one is due."""
         seconds = perf_counter() - self._began
-        left = f", {_rounded(seconds * (1.0 / self._part - 1.0))} left" if 0.0 < self._part < 1.0 else ""
-        text = f"{self._doing}: {_rounded(seconds)}{left}"
-        typer.echo(f"\r{text:<{len(self._said)}}", err=True, nl=False)
-        self._said = text
+        text = self._text(seconds)
+        if self._is_rewritten:
+            typer.echo(f"\r{text:<{len(self._said)}}", err=True, nl=False)
+        elif seconds < self._next:
+            return
+        else:
+            typer.echo(text, err=True)
+        self._said, self._next = text, 2.0 * seconds
 
     def end(self) -> None:
         """Write it a last time, if it was ever written."""
         if self._said:
+            self._next = 0.0
             self.say()
-            typer.echo(err=True)
+            if self._is_rewritten:
+                typer.echo(err=True)
+
+    def _text(self, seconds: float) -> str:
+        left = f", {_rounded(seconds * (1.0 / self._part - 1.0))} left" if 0.0 < self._part < 1.0 else ""
+        return f"{self._doing}: {_rounded(seconds)}{left}"
+
+
+def is_terminal() -> bool:
+    """Whether somebody looks at standard error as it is written."""
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
 def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
@@ -62,7 +79,7 @@ def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
 
 @contextmanager
 def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
-    """Say on standard error what is being done, once a second; nothing if it is done in a moment.
+    """Say on standard error what is being done, on a terminal once a second; nothing if it is done in a moment.
 
     Gives whom to tell the part that is done (``Line.tell``), who raises ``KeyboardInterrupt`` where one was lost.
     """

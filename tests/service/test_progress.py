@@ -23,6 +23,11 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "MOMENT", 0.02)
 
 
+@pytest.fixture
+def on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "is_terminal", lambda: True)
+
+
 def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -39,7 +44,7 @@ def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
     assert err.endswith("\n")
 
 
-@pytest.mark.usefixtures("impatient")
+@pytest.mark.usefixtures("impatient", "on_a_terminal")
 def test_the_time_left_is_told_once_it_is_known_which_part_is_done(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -54,7 +59,7 @@ def test_the_time_left_is_told_once_it_is_known_which_part_is_done(
     assert capsys.readouterr().err == "\rthinking: 30 s, 90 s left\rthinking: 10 min, 10 min left\n"
 
 
-@pytest.mark.usefixtures("impatient")
+@pytest.mark.usefixtures("impatient", "on_a_terminal")
 def test_things_are_counted_as_they_are_done(capsys: pytest.CaptureFixture[str]) -> None:
     for _ in counted(range(3), 3, "logs"):
         time.sleep(0.05)
@@ -63,6 +68,7 @@ def test_things_are_counted_as_they_are_done(capsys: pytest.CaptureFixture[str])
     assert re.search(r"\r3 of 3 logs: \d+ s *\n$", err)
 
 
+@pytest.mark.usefixtures("on_a_terminal")
 def test_a_line_that_becomes_shorter_covers_what_stood_there(capsys: pytest.CaptureFixture[str]) -> None:
     line = progress.Line("thinking hard")
     line.say()
@@ -158,7 +164,7 @@ def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(t
     given = ["simulate", "lifting_10N", "--accuracy", "0.001", "--output", str(tmp_path / "log.npz")]
     with subprocess.Popen([sys.executable, "-c", run, *given], stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
-        assert process.stderr.read(1) == b"\r"  # it is at it
+        assert process.stderr.readline().startswith(b"simulating")  # it is at it
         process.send_signal(signal.SIGINT)
         try:
             _, told = process.communicate(timeout=60.0)
@@ -170,3 +176,16 @@ def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(t
     for log in kept:
         assert formats.read(log).metadata["stopped"] == "interrupted"
     assert kept or told.endswith(b"\nstiction: interrupted; nothing is left half written\n")
+
+
+def test_in_a_file_whole_lines_follow_each_other_ever_more_seldom(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moments = iter(range(100))
+    with monkeypatch.context() as patched:
+        patched.setattr(progress, "perf_counter", lambda: float(next(moments)))
+        line = progress.Line("thinking")
+        for _ in range(9):
+            line.say()
+        line.end()
+    assert capsys.readouterr().err.splitlines() == [f"thinking: {seconds} s" for seconds in (1, 2, 4, 8, 10)]
