@@ -72,7 +72,7 @@ def draw_forces(curve: ForceCurve, asked: float) -> ForceChart:
         marked=across(asked),
         marked_force=up(at_asked) if math.isfinite(at_asked) else None,
         x_ticks=[Tick(across(10.0**power), f"10{str(power).translate(_RAISED)}") for power in _powers(x_least)],
-        y_ticks=[Tick(up(y), f"{y:g}") for y in rounded(ticks(0.0, y_most))],
+        y_ticks=[Tick(up(y), f"{y:g}") for y in rounded(ticks(0.0, y_most))] if holds.any() else [],
     )
 
 

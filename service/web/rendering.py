@@ -1,5 +1,6 @@
 """Templates made into answers: whatever somebody typed is escaped, and a page may load nothing but our own files."""
 
+import re
 from functools import cache
 from typing import Any
 from urllib.parse import quote
@@ -7,6 +8,7 @@ from urllib.parse import quote
 from fastapi import Request
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from db.records import StoredGraspLog
 from service import formatting
@@ -46,6 +48,11 @@ def has_reconstructed_forces(log: StoredGraspLog) -> bool:
     return any(finding.name in BY_DISPLACEMENT for finding in findings)
 
 
+def with_code(text: str) -> Markup:
+    """Text of ours whose `names` in backticks are set as code; all else is escaped."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 @cache
 def _environment() -> Environment:
     environment = Environment(
@@ -61,5 +68,6 @@ def _environment() -> Environment:
     environment.filters["record_next"] = record_next
     environment.filters["has_reconstructed_forces"] = has_reconstructed_forces
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
+    environment.filters["with_code"] = with_code
     environment.globals["asset"] = path_of
     return environment

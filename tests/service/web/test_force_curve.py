@@ -50,4 +50,5 @@ def test_where_none_holds_all_is_without_and_nothing_is_marked() -> None:
     chart = draw_forces(ForceCurve(grid, none, none), 1e-2)
     assert (chart.line, chart.band.strip()) == ("", "")
     assert chart.without == pytest.approx((LEFT, WIDTH - RIGHT))
+    assert chart.y_ticks == []
     assert chart.marked_force is None

@@ -262,8 +262,10 @@ def test_each_type_of_problem_has_a_page_at_its_address(browser: Any, elements: 
     for kind in PROBLEM_TYPES.values():
         answer = browser.get(kind.uri, headers={"accept": "*/*"})
         page = elements(answer.text).text
-        assert (answer.status_code, kind.title in page, MEANINGS[kind.name].when in page) == (200, True, True)
+        meaning = MEANINGS[kind.name].when.replace("`", "")  # set as code
+        assert (answer.status_code, kind.title in page, meaning in page, "`" in page) == (200, True, True, False)
         assert kind.title in everything
+    assert "<code>largest_load</code>" in browser.get("/problems/no-feasible-force").text
     assert browser.get("/problems/nothing").status_code == 404
 
 
