@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import re
 from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
@@ -17,6 +18,7 @@ from service.domain import errors
 from service.domain.errors import DomainError, InsufficientScope
 from service.domain.logs.damage import record_damage
 from service.http.access import CHALLENGE_OF_INVALID_KEY, challenge_of_scope
+from service.http.idempotency import KEY_PATTERN, KEY_RULE
 from service.http.problems import (
     BAD_REQUEST,
     FILE_DAMAGED,
@@ -55,6 +57,8 @@ from service.http.problems import (
     problem_response,
     storage_unavailable,
 )
+from service.http.schemas.common import NAME_PATTERN, NAME_RULE
+from service.http.schemas.owners import OWNER_PATTERN, OWNER_RULE
 from service.processes.fair_queue import QueueFull
 
 logger = logging.getLogger(__name__)
@@ -85,6 +89,20 @@ OF_USE_CASES: Mapping[type[DomainError], ProblemType] = {
     errors.JobEnded: JOB_ENDED,
 }
 """The problem type of every error of a use case."""
+
+RULE_OF_PATTERN = {NAME_PATTERN: NAME_RULE, OWNER_PATTERN: OWNER_RULE, KEY_PATTERN: KEY_RULE}
+"""What text is to be, in words."""
+
+WORDS_OF_KIND = {
+    "extra_forbidden": "no field of this name",
+    "model_attributes_type": "a JSON object",
+    "string_too_short": "text of at least {min_length} character(s)",
+    "string_too_long": "text of at most {max_length} characters",
+}
+"""Of an error of the framework's, by its type."""
+
+BOUNDS = frozenset({"greater_than", "greater_than_equal", "less_than", "less_than_equal"})
+"""Types of the framework's errors that NaN has, too, which is not to be taken for a number beyond a bound."""
 
 _UNKNOWN = {
     "material": UNKNOWN_MATERIAL,
@@ -183,8 +201,19 @@ def _wrong_value(entry: dict[str, Any]) -> Problem:
     name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
     if entry["type"] == "missing":
         return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
+    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], _allowed(entry))
+
+
+def _allowed(entry: dict[str, Any]) -> str:
+    """What would be right, in words of ours where the framework's are a pattern, or no more than what is wrong."""
+    kind, ctx = entry["type"], entry.get("ctx", {})
+    if kind in WORDS_OF_KIND:
+        return WORDS_OF_KIND[kind].format(**ctx)
+    if kind == "string_pattern_mismatch":
+        return RULE_OF_PATTERN.get(ctx["pattern"], f"text that matches {ctx['pattern']}").removesuffix(".")
     allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], allowed)
+    allowed = re.sub(r"0\.0{4,}\d+", lambda small: f"{float(small[0]):g}", allowed)
+    return f"a number {allowed}" if kind in BOUNDS and str(entry["input"]).lower() == "nan" else allowed
 
 
 async def _on_http_exception(request: Request, error: Exception) -> JSONResponse:

@@ -17,13 +17,15 @@ from service.http.dependencies import CurrentContext
 from service.http.problems import IDEMPOTENCY_KEY_REUSED, INVALID_REQUEST, Problem
 
 LONGEST_KEY = 200
+KEY_PATTERN = rf"^[!-~]{{1,{LONGEST_KEY}}}$"
+KEY_RULE = f"1 to {LONGEST_KEY} visible ASCII characters"
 
 KeyHeader = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",
         description="Anything of your own, such as a UUID: the same request under the same key is done once",
-        pattern=rf"^[!-~]{{1,{LONGEST_KEY}}}$",
+        pattern=KEY_PATTERN,
     ),
 ]
 

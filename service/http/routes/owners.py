@@ -17,15 +17,15 @@ from service.http.problems import (
     UNKNOWN_MATERIAL,
     UNKNOWN_OWNER,
 )
-from service.http.schemas.owners import OwnersOut
+from service.http.schemas.owners import OWNER_PATTERN, OWNER_RULE, OwnersOut
 
 router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"], route_class=FairRoute)
 
 Owner = Annotated[
     str,
     Path(
-        pattern=r"^(key:[0-9a-f]{12}|group:[A-Za-z0-9][A-Za-z0-9 ._-]{0,99})$",
-        description="`key:` and the id of an access key, or `group:` and a group's name.",
+        pattern=OWNER_PATTERN,
+        description=OWNER_RULE,
         examples=["key:3f9c2a7b51de"],
     ),
 ]

@@ -4,6 +4,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+OWNER_PATTERN = r"^(key:[0-9a-f]{12}|group:[A-Za-z0-9][A-Za-z0-9 ._-]{0,99})$"
+OWNER_RULE = "`key:` and the id of an access key, or `group:` and a group's name."
+
 
 class OwnersOut(BaseModel):
     """Whose a material is."""

@@ -12,6 +12,7 @@ from service.domain.errors import (
     QuotaExceeded,
 )
 from service.http.errors import OF_USE_CASES, _wrong_value, problem_of
+from service.http.schemas.common import NAME_PATTERN, NAME_RULE
 
 
 def below(kind: type[DomainError]) -> Iterator[type[DomainError]]:
@@ -101,3 +102,22 @@ def test_what_the_framework_finds_wrong_is_told_as_any_wrong_value(
         allowed,
     )
     assert problem.detail == f"{name} is {value}; allowed: {allowed}"
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "ctx", "msg", "allowed"),
+    [
+        ("extra_forbidden", 1, {}, "Extra inputs are not permitted", "no field of this name"),
+        ("model_attributes_type", [], {}, "Input should be a valid dictionary or object to …", "a JSON object"),
+        ("string_too_short", "", {"min_length": 1}, "String should have …", "text of at least 1 character(s)"),
+        ("string_pattern_mismatch", "a/b", {"pattern": NAME_PATTERN}, "String …", NAME_RULE.removesuffix(".")),
+        ("string_pattern_mismatch", "x", {"pattern": "^a$"}, "String should match …", "text that matches ^a$"),
+        ("less_than_equal", "nan", {}, "Input should be less than or equal to 1", "a number less than or equal to 1"),
+        ("greater_than", -1, {}, "Input should be greater than 0.000000000001", "greater than 1e-12"),
+    ],
+)
+def test_what_is_allowed_is_said_in_words_of_ours(
+    kind: str, value: object, ctx: dict[str, object], msg: str, allowed: str
+) -> None:
+    entry = {"type": kind, "loc": ("body", "name"), "input": value, "ctx": ctx, "msg": msg}
+    assert _wrong_value(entry).allowed == allowed
