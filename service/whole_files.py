@@ -20,8 +20,11 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     target = Path(os.path.realpath(path))
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise FileExistsError(f"{path} is there and is neither a file nor a folder")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(mkdtemp(SUFFIX, PREFIX, target.parent))
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(mkdtemp(SUFFIX, PREFIX, target.parent))
+    except OSError as error:  # of a folder that nobody has named
+        raise OSError(error.errno, error.strerror, str(path)) from error
     try:
         write(beside / target.name)
         (beside / target.name).replace(target)

@@ -22,8 +22,19 @@ def message(error: Exception) -> str:
 
     from service.settings import complaints
 
-    message = complaints(error) if isinstance(error, ValidationError) else str(error)
-    return "\n".join([message, *getattr(error, "__notes__", ())])
+    if isinstance(error, ValidationError):
+        text = complaints(error)
+    else:
+        text = _of_system(error) if isinstance(error, OSError) else str(error)
+    return "\n".join([text, *getattr(error, "__notes__", ())])
+
+
+def _of_system(error: OSError) -> str:
+    """What a system says of a file, without its number of the error; of two files, that which was to be written."""
+    name = error.filename if error.filename2 is None else error.filename2
+    if error.strerror is None:
+        return str(error)
+    return error.strerror if name is None else f"{name!r}: {error.strerror}"
 
 
 def exit_code(error: Exception) -> int | None:

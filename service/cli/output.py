@@ -49,7 +49,8 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
         table.add_column(escape(column), overflow="fold")
     for row in rows:  # units are in brackets, as markup
         table.add_row(*("" if cell is None else escape(printable(str(cell))) for cell in row))
-    Console(width=None if sys.stdout.isatty() else width).print(table)
+    is_terminal = sys.stdout is not None and sys.stdout.isatty()  # None: closed, as by `>&-`
+    Console(width=None if is_terminal else width).print(table)
 
 
 def when(text: str) -> str:

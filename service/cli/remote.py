@@ -207,6 +207,7 @@ def _check_area(area: float) -> None:
     try:
         is_meant = typer.confirm(asked, err=True)
     except typer.Abort:
+        typer.echo(err=True)  # the question has no end of its own
         is_meant = False
     if not is_meant:
         raise typer.BadParameter(f"--contact-area is {area:g} m²; allowed: that of one finger, such as 1e-4")

@@ -118,3 +118,11 @@ def test_the_folder_that_one_works_in_is_refused_as_any_other(tmp_path: Path, mo
     with pytest.raises(IsADirectoryError):
         write_whole(Path(), lambda beside: beside.write_text("new"))
     assert tmp_path.is_dir()
+
+
+def test_where_no_file_may_be_made_the_one_that_was_to_be_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "file" / "report.html", Path("/proc/report.html")):
+        with pytest.raises(OSError) as refusal:  # noqa: PT011
+            write_whole(path, half_a_file)
+        assert refusal.value.filename == str(path)

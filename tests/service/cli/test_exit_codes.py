@@ -88,3 +88,16 @@ def test_what_is_said_of_an_error_is_its_text_and_its_notes_line_by_line() -> No
 )
 def test_the_first_argument_that_is_no_text_is_named(arguments: list[str], garbled: str | None) -> None:
     assert cli._garbled(arguments) == garbled
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (FileNotFoundError(2, "No such file or directory", "a\udcff.npz"), r"'a\udcff.npz': No such file or directory"),
+        (OSError(21, "Is a directory", "/tmp/.stiction-1.part/logs", None, "logs"), "'logs': Is a directory"),
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (FileExistsError("logs is there"), "logs is there"),
+    ],
+)
+def test_what_a_system_says_of_a_file_is_said_of_the_one_that_a_user_knows(error: OSError, said: str) -> None:
+    assert message(error) == said

@@ -35,3 +35,8 @@ def test_json_holds_arrays_as_lists_and_no_nan(capsys: Capture) -> None:
     out = capsys.readouterr().out
     assert json.loads(out) == {"name": "β", "found": None, "true": True}
     assert out == '{\n  "name": "β",\n  "found": null,\n  "true": true\n}\n'
+
+
+def test_a_table_is_of_no_use_where_nothing_can_be_printed_and_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdout", None)
+    print_table("Logs", ("id",), [("1",)])
