@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from db.defaults import QUARANTINE_AGE
-from service.cli.durations import duration
+from service.cli.durations import duration, in_words
 from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
@@ -85,7 +85,8 @@ def _prune_unreferenced(database: "Database", blobs: "BlobStore", grace: timedel
         typer.echo(f"set {garbage.set_aside(database, blobs)} unreferenced files aside")
         return
     old, new = garbage.find_deletable(database, blobs, grace), garbage.find_unreferenced(database, blobs)
-    typer.echo(f"{sum(1 for _ in old)} unreferenced files would be deleted, which are in quarantine for {grace}")
+    due, kept = sum(1 for _ in old), in_words(grace)
+    typer.echo(f"{due} unreferenced files would be deleted, which are in quarantine for {kept}")
     typer.echo(f"{sum(1 for _ in new)} unreferenced files would be set aside")
 
 

@@ -21,6 +21,12 @@ def duration(name: str, text: str) -> timedelta:
     return length
 
 
+def in_words(length: timedelta) -> str:
+    """Such as "7 days" or "12 h"."""
+    days = length / _UNITS["d"]
+    return f"{days:g} days" if days >= 2.0 else f"{length / _UNITS['h']:g} h"
+
+
 def moment_to_come(name: str, text: str, now: datetime) -> datetime:
     """A duration from ``now``, or a date (its beginning in UTC) or moment of ISO 8601 after it."""
     try:

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 import typer
 
-from service.cli.durations import duration, moment_to_come
+from service.cli.durations import duration, in_words, moment_to_come
 
 NOW = datetime(2026, 11, 26, 12, tzinfo=UTC)
 
@@ -58,3 +58,17 @@ def test_now_is_past(text: str) -> None:
 def test_what_is_no_moment_is_refused_with_what_is(text: str) -> None:
     with pytest.raises(typer.BadParameter, match=f"expires is {text}; allowed: such as 90d, 12h or 2027-01-31"):
         moment_to_come("expires", text, NOW)
+
+
+@pytest.mark.parametrize(
+    ("length", "words"),
+    [
+        (timedelta(days=7), "7 days"),
+        (timedelta(days=1.5), "36 h"),
+        (timedelta(hours=12), "12 h"),
+        (timedelta(days=2), "2 days"),
+        (timedelta(0), "0 h"),
+    ],
+)
+def test_a_length_of_time_is_told_in_days_or_hours(length: timedelta, words: str) -> None:
+    assert in_words(length) == words
