@@ -123,7 +123,7 @@ class UnusedSetting(InvalidInput):
     """A setting given with a format that has no use for it."""
 
 
-def read(path: Path, content_type: str | None = None, **settings: float | str | Path | None) -> GraspLog:
+def read(path: Path | str, content_type: str | None = None, **settings: float | str | Path | None) -> GraspLog:
     """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording or, with
     the episode in the mapping, of a LeRobot data set.
 
@@ -133,6 +133,7 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     recording of the sensor alone in the same format. Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is
     wrong inside.
     """
+    path = Path(path)
     name = identify(path, content_type, settings)
     check_settings(name, settings)
     given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}

@@ -18,7 +18,7 @@ MAX_MAPPING_BYTES = 64 * 1024
 LENGTH = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 ANGLE = {"rad": 1.0, "deg": math.pi / 180.0}
-FORCE = {"N": 1.0, "mN": 1e-3}
+FORCE = {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "µN": 1e-6}
 UNITS: dict[str, Mapping[str, float]] = {
     "time": TIME,
     "position": LENGTH,

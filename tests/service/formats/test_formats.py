@@ -10,6 +10,7 @@ from service import formats
 from service.formats.assemble import MAX_CONTENT_BYTES
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore import GraspLog, InvalidInput
+from slipcore.contact import tangential_ramp
 from stiction_client import container
 
 Fields = dict[str, np.ndarray]
@@ -89,3 +90,12 @@ def test_the_error_survives_pickling() -> None:
     error = pickle.loads(pickle.dumps(formats.UnsupportedFormat("content type", "text/csv")))
     assert isinstance(error, formats.UnsupportedFormat)
     assert error.value == "text/csv"
+
+
+def test_a_notebook_reads_a_log_as_its_page_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "notebook.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.M | re.S)
+    monkeypatch.chdir(tmp_path)
+    Path("grasp.npz").write_bytes(container.encode(tangential_ramp(points=10, pitch=1.5e-3, seed=1)))
+    exec(compile(code, "notebook.md", "exec"), {})
+    assert Path("samples.csv").read_text().startswith("friction_coefficient,")

@@ -38,6 +38,7 @@ def parsed(**entries: Any) -> mapping.FieldMapping:
         ("element_area", "mm2", 1e-6),
         ("force", "N", 1.0),
         ("force", "mN", 1e-3),
+        ("force", "uN", 1e-6),
     ],
 )
 def test_units_are_brought_to_si(name: str, unit: str, factor: float) -> None:
