@@ -45,9 +45,7 @@ def adapted(log_density: LogDensity, dimension: int, rng: np.random.Generator) -
 
 def _pilot(log_density: LogDensity, dimension: int, rng: np.random.Generator) -> FloatArray:
     """Points [k, d] roughly where the density has its mass: walkers from near and far that evolve differentially."""
-    from emcee.moves import DEMove  # emcee takes a second to load
-
-    from estimators.sampling.ensemble import VectorisedSampler
+    from estimators.sampling.ensemble import EvolutionMove, VectorisedSampler  # emcee takes a second to load
 
     near = standard(dimension)
     count = PROPOSAL.pilot_candidates * PROPOSAL.pilot_walkers
@@ -58,7 +56,7 @@ def _pilot(log_density: LogDensity, dimension: int, rng: np.random.Generator) ->
         return np.asarray(x)
     weight = flattened(log_weight[possible]) + PROPOSAL.pilot_floor
     start = x[possible][rng.choice(len(weight), PROPOSAL.pilot_walkers, p=weight / weight.sum())]
-    sampler = VectorisedSampler(PROPOSAL.pilot_walkers, dimension, log_density, moves=DEMove(), vectorize=True)
+    sampler = VectorisedSampler(PROPOSAL.pilot_walkers, dimension, log_density, moves=EvolutionMove(), vectorize=True)
     sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
     sampler.run_mcmc(start, PROPOSAL.pilot_steps, skip_initial_state_check=True)
     chain = sampler.get_chain(discard=PROPOSAL.pilot_steps // 2, thin=PROPOSAL.pilot_thin, flat=True)

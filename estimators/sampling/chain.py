@@ -55,9 +55,9 @@ def sample(
     instead, which frees walkers from where the proposal seldom comes. Where the density, which should be close to
     N(0, I), is too far from the proposal, differential evolution takes over. ``log_probability`` takes [k, d].
     """
-    from emcee.moves import DEMove, GaussianMove  # emcee takes a second to load
+    from emcee.moves import GaussianMove  # emcee takes a second to load
 
-    from estimators.sampling.ensemble import IndependenceMove
+    from estimators.sampling.ensemble import EvolutionMove, IndependenceMove
 
     deadline = np.inf if seconds is None else time.perf_counter() + seconds
     goal = SAMPLING.accuracy if accuracy is None else accuracy
@@ -68,7 +68,7 @@ def sample(
     chain = _run(task, [(IndependenceMove(proposal), 1.0 - local), (small, local)], "independence")
     if chain.acceptance >= SAMPLING.min_acceptance:
         return chain
-    return _run(task, DEMove(), "differential evolution")
+    return _run(task, EvolutionMove(), "differential evolution")
 
 
 def autocorrelation_time(series: FloatArray) -> FloatArray:
