@@ -1,6 +1,7 @@
 """A parameter that a route does not know, or that stands twice, changes no answer without a word."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -9,13 +10,18 @@ from service.app import create_app
 from service.settings import Settings
 
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
-OPERATIONS = [
-    (method.upper(), path, [each["name"] for each in operation.get("parameters", []) if each["in"] == "query"])
-    for path, operations in create_app(Settings()).openapi()["paths"].items()
-    for method, operation in operations.items()
-    if path.startswith("/v1/")
-]
 IDENTITY = {"{name}": "paper", "{alias}": "copy", "{owner}": "group:lab", "{version}": "1", "{id}": "0" * 32}
+
+
+@cache
+def described() -> list[tuple[str, str, list[str]]]:
+    """Method and path of each operation, with the parameters of its query."""
+    return [
+        (method.upper(), path, [each["name"] for each in operation.get("parameters", []) if each["in"] == "query"])
+        for path, operations in create_app(Settings()).openapi()["paths"].items()
+        for method, operation in operations.items()
+        if path.startswith("/v1/")
+    ]
 
 
 def placed(path: str) -> str:
@@ -27,7 +33,7 @@ def placed(path: str) -> str:
 @ONLY_SQLITE
 def test_an_unknown_parameter_is_refused_by_each_route_with_those_it_takes(reach: Callable[..., Any]) -> None:
     client = reach("open")
-    for method, path, known in OPERATIONS:
+    for method, path, known in described():
         body = {} if method in {"GET", "DELETE"} else {"content": "{}", "headers": {"content-type": "application/json"}}
         answer = client.request(method, f"{placed(path)}?quantil=0.05", **body)
         told = answer.json()
@@ -39,7 +45,7 @@ def test_an_unknown_parameter_is_refused_by_each_route_with_those_it_takes(reach
 @ONLY_SQLITE
 def test_a_parameter_that_stands_twice_is_refused(reach: Callable[..., Any]) -> None:
     client = reach("open")
-    for method, path, known in OPERATIONS:
+    for method, path, known in described():
         for name in known:
             answer = client.request(method, f"{placed(path)}?{name}=1&{name}=1", headers={"content-type": "text/csv"})
             told = answer.json()

@@ -1,17 +1,17 @@
 """An executor on a cluster, without one: what it waits for, and what it makes of a worker's end."""
 
 import asyncio
+import sys
+from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from distributed import KilledWorker
 
 from db.records import Claim
-from service.jobs import dask_executor, worker
-from service.jobs.dask_executor import DaskExecutor
+from service.jobs import worker
 from service.jobs.executor import WorkerDied
 from service.jobs.worker import StoreConfig
 from tests.sleeping import replace_sleep
@@ -47,10 +47,18 @@ class Cluster:
         raise OSError("gone")
 
 
-def executor(cluster: Cluster) -> DaskExecutor:
+def executor(cluster: Cluster) -> Any:
+    from service.jobs.dask_executor import DaskExecutor  # takes half a second to load
+
     made = DaskExecutor(CONFIG, "tcp://a:1")
     made._client = cluster
     return made
+
+
+def killed() -> BaseException:
+    from distributed import KilledWorker
+
+    return KilledWorker("job", LAST, 3)
 
 
 def test_a_job_is_handed_on_with_its_stores() -> None:
@@ -62,13 +70,13 @@ def test_a_job_is_handed_on_with_its_stores() -> None:
 @pytest.mark.parametrize(
     ("error", "told"),
     [
-        (asyncio.CancelledError(), "the connection to tcp://a:1 is lost"),
-        (KilledWorker("job", LAST, 3), "run task .job. on 4 different workers"),
+        (asyncio.CancelledError, "the connection to tcp://a:1 is lost"),
+        (killed, "run task .job. on 4 different workers"),
     ],
 )
-def test_a_worker_that_died_is_told_from_a_job_that_failed(error: BaseException, told: str) -> None:
+def test_a_worker_that_died_is_told_from_a_job_that_failed(error: Callable[[], BaseException], told: str) -> None:
     with pytest.raises(WorkerDied, match=told):
-        asyncio.run(executor(Cluster(error)).run(Claim("job", "runner")))
+        asyncio.run(executor(Cluster(error())).run(Claim("job", "runner")))
     with pytest.raises(ValueError, match="wrong"):
         asyncio.run(executor(Cluster(ValueError("wrong"))).run(Claim("job", "runner")))
 
@@ -104,4 +112,4 @@ def test_a_scheduler_is_asked_again_each_second_until_a_worker_is_warm(
     assert made.missing is None
     assert cluster.done == [(worker.warm_up,)] * 3
     assert caplog.messages[0] == "the Dask scheduler tcp://a:1 does not answer: refused"
-    assert dask_executor.CONNECT_SECONDS == 5.0
+    assert sys.modules[type(made).__module__].CONNECT_SECONDS == 5.0
