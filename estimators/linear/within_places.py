@@ -1,15 +1,22 @@
 """What samples say about the means of their places: freed of noise, and of errors that go together over time."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from estimators.defaults import CLUSTERS, ROUNDING
-from estimators.linear.lasting_errors import SPARE
+from estimators.defaults import CLUSTERS, IDENTIFIABILITY, ROUNDING
 from estimators.linear.least_squares import upper_triangle
-from estimators.linear.slopes_of_places import Sums, power, spanned, sums_of, variances
+
+if TYPE_CHECKING:
+    from estimators.linear.slopes_of_places import Sums
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+SPARE = 3
+"""Levels beyond what a fit of them takes up, from which the mean of their variance exists."""
 
 
 def within_places(
@@ -21,19 +28,16 @@ def within_places(
     ``values`` [k, 3]: what deviates, at ``time`` [k] s in a ``place`` [k], codes from 0; ``noise`` [2]: roots of the
     sums of squares that noise in v and f_n adds.
     """
-    root = np.sqrt(weight)[:, None]
-    rows = root * deviation
-    varies = np.linalg.norm(rows[:, :2], axis=0) > ROUNDING * np.linalg.norm(root * values[:, :2], axis=0)
-    rows[:, :2] *= varies  # else the noise of a force that stays as it is would stand in the same direction as velocity
-    axes = spanned(rows[:, :2])
-    told = axes.T @ rows
-    residual = rows[:, 2] - axes @ told[:, 2]
-    left = np.append(np.zeros(2), np.linalg.norm(residual))
-    told[:, :2] = calibrated(told[:, :2], noise)
-    shares = (np.eye(len(told)),) * 2
-    if axes.size and left[2] > ROUNDING * np.linalg.norm(root[:, 0] * values[:, 2]):
-        shares = _fewer(sums_of(axes, residual / left[2], root[:, 0], _stretches(time), place), len(rows))
-    beside, alone = (np.asarray(upper_triangle(np.vstack([share @ told, left])), dtype=float) for share in shares)
+    from estimators.linear.slopes_of_places import seen_within, sums_of  # numba takes a while to load
+
+    root = np.sqrt(weight)
+    seen = seen_within(np.ascontiguousarray(values), deviation, root, CLUSTERS.alone, ROUNDING)
+    seen.told[:, :2] = calibrated(seen.told[:, :2], noise)
+    shares = (np.eye(len(seen.told)),) * 2
+    if len(seen.told) and seen.size > 0.0:
+        shares = _fewer(sums_of(seen.axes, seen.residual / seen.size, root, _stretches(time), place), len(root))
+    left = np.append(np.zeros(2), np.linalg.norm(seen.residual))
+    beside, alone = (np.asarray(upper_triangle(np.vstack([share @ seen.told, left])), dtype=float) for share in shares)
     return beside, alone
 
 
@@ -52,7 +56,7 @@ def calibrated(regressors: FloatArray, noise: FloatArray) -> FloatArray:
     return np.asarray(regressors - (axes * np.minimum(parts, 1.0) ** 2) @ axes.T @ regressors)
 
 
-def _fewer(sums: Sums, samples: int) -> tuple[FloatArray, FloatArray]:
+def _fewer(sums: "Sums", samples: int) -> tuple[FloatArray, FloatArray]:
     """Roots [d, d] of the share of so many samples that inform each slope as independent ones would: of a grasp of
     several, and of one alone.
 
@@ -61,40 +65,45 @@ def _fewer(sums: Sums, samples: int) -> tuple[FloatArray, FloatArray]:
     slope (Kish, 1965, ch. 8). Those of a place may last for longer than a stretch; what all places have in one comes on
     top. One place among several grasps shows that by its slopes (``slopes_of_grasps``).
     """
-    places, slopes = len(sums.weight), sums.along.shape[2]
-    unit = np.eye(slopes)
-    if sums.levels < places + slopes + SPARE:
-        return (_root_of_share(unit, unit / samples, sums.scores),) * 2
+    from estimators.linear.slopes_of_places import information_left
+
+    levels, (places, _, slopes) = int(np.count_nonzero(sums.weight)), sums.along.shape
+    settings = CLUSTERS.by_chance, CLUSTERS.alone
+    unit, enough = np.eye(slopes), levels >= places + slopes + SPARE
+    if places == 1 or not enough:
+        beside = information_left(unit, unit / samples, sums.scores, levels, *settings)
+    if not enough:
+        return beside, beside
     freedom = samples - places - slopes  # what is left of a fit is less than the errors are
-    found = (_beyond_chance(freedom * variance, sums.levels) for variance in variances(sums))
-    own = _products(sums.scores)
-    beside, alone = (_root_of_share(times, own, sums.scores) for times in found)
-    return beside if places > 1 else _root_of_share(unit, unit / samples, sums.scores), alone
+    flat = sums.scores.reshape(-1, slopes)
+    several, alone = (
+        information_left(freedom * found, flat.T @ flat, sums.scores, levels, *settings) for found in variances(sums)
+    )
+    return several if places > 1 else beside, alone
 
 
-def _root_of_share(times: FloatArray, own: FloatArray, scores: FloatArray) -> FloatArray:
-    """Of slopes whose variance errors of places make so many ``times`` larger, [d, d], and what all places have in a
-    stretch as many times as the sums of ``scores`` [p, b, d] over them have the variance of their ``own`` [d, d] (Liang
-    & Zeger, 1986).
+def variances(sums: "Sums") -> tuple[FloatArray, FloatArray]:
+    """Of the slopes of a grasp, [d, d], as one of several and where it is alone.
+
+    Errors of its places last as their levels say. Places of which these say too little show by how much their slopes
+    differ; against that, levels have the weight of ``lasting_freedom`` degrees of freedom. With as many beside those of
+    the places, what lasts is allowed for by Student's t in place of the normal density.
     """
-    count = scores.shape[1]
-    half, unit = power(times, 0.5), power(own, -0.5)
-    shared = unit @ _products(scores.sum(axis=0)) @ unit * count / max(count - 1, 1)
-    parts, directions = np.linalg.eigh(half @ _beyond_chance(shared, count) @ half)
-    return np.asarray((directions / np.sqrt(np.maximum(parts, 1.0))) @ directions.T)
+    from estimators.linear.few_columns import spanned
+    from estimators.linear.lasting_errors import errors_of_levels
+    from estimators.linear.slopes_of_places import compared, errors_of_slopes, levels_of
 
-
-def _products(sums: FloatArray) -> FloatArray:
-    """Sum of the products [d, d] of ``sums`` [..., d]."""
-    rows = sums.reshape(-1, sums.shape[-1])
-    return np.asarray(rows.T @ rows)
-
-
-def _beyond_chance(times: FloatArray, count: int) -> FloatArray:
-    """The same matrix [d, d], 1 along what so many independent errors may have by chance."""
-    parts, directions = np.linalg.eigh(times)
-    parts = np.where(parts > 1.0 + CLUSTERS.by_chance * np.sqrt(2.0 / count), parts, 1.0)
-    return np.asarray((directions * parts) @ directions.T)
+    level, means = levels_of(sums)
+    design = spanned(means, CLUSTERS.alone).reshape(*level.shape, -1)
+    own, lasting = errors_of_slopes(sums, level, *errors_of_levels(level, design, sums.weight, CLUSTERS.independent))
+    freedom, differ = compared(sums, own + lasting, CLUSTERS.alone)
+    own, lasting = own.sum(axis=0), lasting.sum(axis=0)
+    if len(sums.weight) == 1:
+        return own + lasting, own + lasting
+    known, end = CLUSTERS.lasting_freedom + freedom, IDENTIFIABILITY.ends[1]
+    wider = (special.stdtrit(known, end) / special.ndtri(end)) ** 2
+    times = (CLUSTERS.lasting_freedom + freedom * differ) / known
+    return own + lasting, max(times, 1.0) * (own + wider * lasting)
 
 
 def _stretches(time: FloatArray) -> IntArray:

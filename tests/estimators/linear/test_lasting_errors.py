@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from estimators.linear.lasting_errors import LASTS, OWN, _left, errors_of_levels
-from estimators.linear.whitened_levels import whitened
+from estimators.defaults import CLUSTERS
+from estimators.linear.lasting_errors import KEPT, LASTS, OWN, _left, errors_of_levels
 
 COUNT = 20
 ALIKE = np.ones(COUNT)
@@ -15,7 +15,7 @@ DESIGN = np.linalg.qr(np.column_stack([ALIKE, EVEN]))[0]
 
 def covariance_of_levels(level: np.ndarray, weight: np.ndarray = ALIKE) -> np.ndarray:
     """Of one place."""
-    own, lasting = errors_of_levels(level[None], EVEN[None], weight[None])
+    own, lasting = errors_of_levels(level[None], EVEN[None] / 1.0, weight[None], CLUSTERS.independent)
     return np.diag(own[0]) + lasting
 
 
@@ -64,8 +64,7 @@ def test_what_is_left_is_by_the_whole_covariance_matrix(hidden: list[int]) -> No
     own = np.divide(weight[weight > 0.0].mean(), weight, out=np.zeros_like(weight), where=weight > 0.0)
     rows = rng.standard_normal((3, COUNT, 3))
     rows[..., 0] = 1.0
-    products, size = whitened.py_func(rows, own, np.exp(-1.0 / LASTS), OWN)
-    square, taken = _left(products)
+    square, size = _left.py_func(rows[..., 2], rows[..., 1:2], own, KEPT, OWN)
     seen = (weight > 0.0).ravel()
     for k, (lasts, share) in enumerate(zip(LASTS, OWN, strict=True)):
         covariance = np.kron(np.eye(3), (1.0 - share) * correlations(lasts)) + share * np.diag(own.ravel())
@@ -75,4 +74,4 @@ def test_what_is_left_is_by_the_whole_covariance_matrix(hidden: list[int]) -> No
         parts = np.diagonal(np.linalg.qr(white, mode="r"))
         assert square[k] == pytest.approx(parts[-1] ** 2, rel=1e-9)
         expected = np.log(np.diagonal(root)).sum() + np.log(np.abs(parts[:-1])).sum()
-        assert size[k] + taken[k] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+        assert size[k] == pytest.approx(expected, rel=1e-9, abs=1e-9)

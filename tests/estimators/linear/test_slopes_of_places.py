@@ -5,7 +5,9 @@ import pytest
 from scipy import special
 
 from estimators.defaults import CLUSTERS
-from estimators.linear.slopes_of_places import Sums, power, spanned, sums_of, variances
+from estimators.linear.few_columns import spanned
+from estimators.linear.slopes_of_places import Sums, sums_of
+from estimators.linear.within_places import variances
 
 SAMPLES, STRETCHES = 200, 20
 TIME = np.arange(SAMPLES) * STRETCHES // SAMPLES
@@ -23,7 +25,7 @@ def made(places: int, covariance: np.ndarray, seed: int) -> tuple[Sums, np.ndarr
     root = np.linalg.cholesky(covariance)
     wander = np.linalg.cholesky(lasting_for(60.0)) @ rng.standard_normal((2, places, SAMPLES, 1))
     rows = np.stack([wander[0, ..., 0], wander[1, ..., 0] + wander[0, ..., 0]], axis=-1)
-    axes = spanned((rows - rows.mean(axis=1, keepdims=True)).reshape(-1, 2))
+    axes = spanned((rows - rows.mean(axis=1, keepdims=True)).reshape(-1, 2), CLUSTERS.alone)
     errors = (root @ rng.standard_normal((places, SAMPLES, 1)))[..., 0]
     errors = (errors - errors.mean(axis=1, keepdims=True)).ravel()
     residual = errors - axes @ (axes.T @ errors)
@@ -73,10 +75,3 @@ def test_places_show_by_their_slopes_that_errors_are_others_than_their_levels_sa
 def test_one_place_shows_nothing_but_its_levels() -> None:
     several, alone = variances(made(1, lasting_for(100.0), 0)[0])
     np.testing.assert_array_equal(several, alone)
-
-
-def test_powers_of_a_matrix_leave_what_is_zero() -> None:
-    square = np.outer([3.0, 4.0], [3.0, 4.0])
-    np.testing.assert_allclose(power(square, 0.5) @ power(square, 0.5), square, rtol=1e-12)
-    np.testing.assert_allclose(power(square, -1.0), np.linalg.pinv(square), rtol=1e-9)
-    np.testing.assert_array_equal(power(np.zeros((2, 2)), -0.5), 0.0)
