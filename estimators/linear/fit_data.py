@@ -61,12 +61,18 @@ class FitData:
         return float(self.factor.mean[-1])
 
     @property
+    def of_one_grasp(self) -> bool:
+        """Whether all samples are known to be of one grasp."""
+        if self.observations is not None:
+            return self.cluster_kind != "grasp"
+        return self.cluster_kind == "none" and len(self.blocks[0].grasps) == 1
+
+    @property
     def of_one_record(self) -> bool:
         """Whether all samples are known to be of one grasp at one place: nothing else has errors of its own."""
         if self.observations is not None:
             return self.cluster_kind == "time block"
-        grasps = [grasp for block in self.blocks for grasp in block.grasps]
-        return self.cluster_kind == "none" and len(grasps) == 1 and grasps[0].of_one_place
+        return self.of_one_grasp and self.blocks[0].grasps[0].of_one_place
 
     def places_leave_open(self) -> bool:
         """Whether all samples are of one grasp at several places, too few to show what their lasting errors do.

@@ -17,6 +17,10 @@ FEW_PLACES_ADVICE = (
     "all samples are of one grasp, at places too few to show what errors that last in each of them do to beta1 and "
     "beta2: to know these record several grasps, or more places at once"
 )
+INDEPENDENT_ADVICE = (
+    "all samples are of one grasp, whose errors may last, and this method takes them as independent, so that beta1 and "
+    "beta2 may be off by more than their intervals: fit by auto, or ols to the samples themselves"
+)
 
 
 def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) -> FloatArray:
@@ -32,18 +36,25 @@ def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) ->
     return np.asarray(half / max(mean, np.finfo(float).tiny))
 
 
-def identifiable(effect: FloatArray, prior_shift: FloatArray, *, of_one_record: bool = False) -> NDArray[np.bool_]:
+def identifiable(effect: FloatArray, prior_shift: FloatArray, *, slopes_open: bool = False) -> NDArray[np.bool_]:
     """Whether each coefficient counts as known: its effect is small, and it is the data's rather than the prior's.
 
-    ``of_one_record``: all samples are of one grasp at one place, whose errors may last as long as v and f_n vary. No
-    interval from that record rules it out, so that its slopes do not count as known.
+    ``slopes_open``: all samples are of one grasp whose errors may last as long as v and f_n vary, at one place, where
+    no interval rules it out, or by a method that takes them as independent: its slopes do not count as known.
     """
     known = (effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift)
-    return np.asarray(known & np.array([True, not of_one_record, not of_one_record]))
+    return np.asarray(known & np.array([True, not slopes_open, not slopes_open]))
 
 
-def what_to_record(known: NDArray[np.bool_], data: FitData) -> str | None:
+def takes_as_independent(method: str, data: FitData) -> bool:
+    """Whether a method takes the errors of a single grasp as independent: ``ols`` sees elements in samples alone."""
+    return data.of_one_grasp and (method == "conjugate" or (method == "ols" and data.observations is None))
+
+
+def what_to_record(known: NDArray[np.bool_], method: str, data: FitData) -> str | None:
     """In a sentence, where it is one grasp whose errors may last that leaves slopes unknown."""
     if data.of_one_record:
         return ONE_RECORD_ADVICE
+    if takes_as_independent(method, data):
+        return INDEPENDENT_ADVICE
     return FEW_PLACES_ADVICE if not known[1:].all() and data.places_leave_open() else None

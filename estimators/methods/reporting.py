@@ -18,7 +18,7 @@ from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
-from estimators.methods.identifiability import effects, identifiable, what_to_record
+from estimators.methods.identifiability import effects, identifiable, takes_as_independent, what_to_record
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, SENSOR_GAIN
 
@@ -150,8 +150,9 @@ def report(
     effect = effects(found.covariance, found.degrees_of_freedom, data)
     effect[1] *= slope_inflation(data, linear)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
-    known = identifiable(effect, prior_shift, of_one_record=data.of_one_record)
-    advice = what_to_record(known, data)
+    slopes_open = data.of_one_record or takes_as_independent(method, data)
+    known = identifiable(effect, prior_shift, slopes_open=slopes_open)
+    advice = what_to_record(known, method, data)
     diagnostics = diagnostics | ({ONE_RECORD: advice} if advice else {})
     return FrictionModel(
         method=method,
