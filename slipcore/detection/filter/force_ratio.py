@@ -91,7 +91,8 @@ def weigh_forces(
 ) -> None:
     """Learn the force ratio at which elements slip, each its own and the mean of all; fill the ``evidence`` of each.
 
-    ``noise`` of an element's normal force, N. Of an element whose force opposes the motion the ratio is that of stick.
+    ``noise`` of an element's normal force, N. Of an element whose force opposes the motion the ratio is that of stick,
+    and counts as far as there is motion.
     """
     gain, memory = low_pass(interval, tuning.force_smoothing), -math.expm1(-interval / tuning.ratio_memory)
     left = gain / (2.0 - gain)
@@ -107,8 +108,9 @@ def weigh_forces(
     weight, most = tuning.ratio_weight * gain, tuning.ratio_limit
     for e in range(len(places)):
         i, j = places[e]
-        counts = after[NORMAL, i, j] > least
-        evidence.log_odds[e] = weight * min(max(evidence.log_odds[e], -most), most) if counts else 0.0
+        opposed = after[OPPOSED, i, j]
+        counts = (opposed - 1.0 if opposed > 0.0 else 1.0) if after[NORMAL, i, j] > least else 0.0
+        evidence.log_odds[e] = counts * weight * min(max(evidence.log_odds[e], -most), most)
 
 
 @compiled

@@ -23,12 +23,14 @@ def follow_headings(
     pose: Pose,
     force: FloatArray,
     length: float,
+    gain: float,
     after: FloatArray,
 ) -> None:
     """Put into ``after`` the mean direction of motion over the last ``length`` m, and which elements are opposed: where
-    the object's ``force`` [n, m, 3] N on the sensor points against it. None is for no length, or without forces.
+    the object's ``force`` [n, m, 3] N on the sensor points against it; 1, and the share in which it moved by a length
+    within the memory of forces, of which this step is the ``gain``. None is for no length, or without forces.
 
-    By motion, not by time: what stands still keeps its heading.
+    By motion, not by time: what stands still keeps its heading, and what hardly moves is hardly opposed.
     """
     after[HEADING_X : OPPOSED + 1] = 0.0
     if not length > 0.0:
@@ -44,4 +46,4 @@ def follow_headings(
             heading_y += weight * (y / moved - heading_y)
         after[HEADING_X, i, j], after[HEADING_Y, i, j] = heading_x, heading_y
         if force.size and force[i, j, 0] * heading_x + force[i, j, 1] * heading_y < 0.0:
-            after[OPPOSED, i, j] = 1.0
+            after[OPPOSED, i, j] = 1.0 - math.expm1(-moved / (gain * length))

@@ -101,7 +101,7 @@ def step_elements(
     restick = restick_under_load(before.common, common, anchors, motion, deeper, change, noise, tuning) and not held
     gain = low_pass(noise[0], tuning.force_smoothing)
     follow_forces(elements, room.surface, has_force, gain, after.elements)
-    follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, after.elements)
+    follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, gain, after.elements)
     look_at_forces(elements, places, compared, held, noise, tuning, evidence, after)
     start_elements(position, frame.displacement, shift, stays, pose, variance, after)
     begins = not (restick or math.isnan(room.surface.noise[0]))  # slip does not before noise is known

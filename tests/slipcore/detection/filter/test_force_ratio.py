@@ -152,11 +152,15 @@ def test_a_force_against_the_motion_is_no_friction_of_slip() -> None:
     """After a load is turned back ratios are still those of slip: they speak for stick, and are not learnt."""
     old, new, common, evidence = elements(), elements(NORMAL=1.0, TANGENTIAL=0.4), np.zeros(COMMON), no_evidence()
     old[PROBABILITY] = 0.95
-    new[OPPOSED, 0, 1] = 1.0
-    common[FRICTION : FRICTION + 2] = 40.0, 100.0
-    unwrap(weigh_forces)(old, PLACES, 1e-3, 1.0, TUNING, new, common, evidence)
-    along, opposed, other = evidence.log_odds
-    assert along == other > 0.0 > opposed
+    said = {}
+    for opposed in (2.0, 1.25, 1.0):
+        new[OPPOSED, 0, 1] = opposed
+        common[FRICTION : FRICTION + 2] = 40.0, 100.0
+        unwrap(weigh_forces)(old, PLACES, 1e-3, 1.0, TUNING, new, common, evidence)
+        along, said[opposed], other = evidence.log_odds
+        assert along == other > 0.0
+    assert said[2.0] < 0.0 == said[1.0]  # as far as the object moved that way
+    assert said[1.25] == pytest.approx(0.25 * said[2.0])
     assert new[RATIO_WEIGHT, 0, 1] == 0.0 < new[RATIO_WEIGHT, 0, 0]
     total, weight = unwrap(learn_ratios)(old, PLACES, 1e-6, 0.1, 1.0, TUNING, new, evidence)
     assert total / weight == pytest.approx(0.4)

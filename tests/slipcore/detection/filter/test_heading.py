@@ -10,7 +10,7 @@ from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.pose import AnchorMotion, pose_at
 from slipcore.detection.filter.state import HEADING_X, HEADING_Y, OPPOSED, ROWS
 
-LENGTH = 5e-6
+LENGTH, GAIN = 5e-6, 0.5
 PLACE = np.array([[0, 0]])
 
 
@@ -20,7 +20,7 @@ def followed(steps: list[float], force: tuple[float, float], yaw: float = 0.0, l
     for step in steps:
         before, after = after, np.full((ROWS, 1, 1), 9.0)
         motion = AnchorMotion(np.array([step]), np.zeros(1), np.zeros(1))
-        unwrap(follow_headings)(before, PLACE, motion, pose_at(0.0, 0.0, yaw, 1.0), forces, length, after)
+        unwrap(follow_headings)(before, PLACE, motion, pose_at(0.0, 0.0, yaw, 1.0), forces, length, GAIN, after)
     return np.asarray(after[:, 0, 0])
 
 
@@ -44,7 +44,7 @@ def test_motion_is_that_of_the_object_and_force_that_on_the_sensor() -> None:
     """Of an object that is turned by a quarter, its x is the sensor's y."""
     found = followed([10.0 * LENGTH], (5.0, -0.1), 0.5 * math.pi)
     assert found[HEADING_Y] == pytest.approx(1.0, abs=1e-4)
-    assert found[OPPOSED] == 1.0
+    assert found[OPPOSED] == pytest.approx(2.0)
 
 
 def test_without_a_length_motion_or_forces_nothing_is_opposed() -> None:
@@ -52,6 +52,13 @@ def test_without_a_length_motion_or_forces_nothing_is_opposed() -> None:
     assert not followed([0.0], (-1.0, 0.0))[OPPOSED]
     after, motion = np.zeros((ROWS, 1, 1)), AnchorMotion(np.array([LENGTH]), np.zeros(1), np.zeros(1))
     pose = pose_at(0.0, 0.0, 0.0, 1.0)
-    unwrap(follow_headings)(np.zeros((ROWS, 1, 1)), PLACE, motion, pose, np.zeros((0, 0, 0)), LENGTH, after)
+    unwrap(follow_headings)(np.zeros((ROWS, 1, 1)), PLACE, motion, pose, np.zeros((0, 0, 0)), LENGTH, GAIN, after)
     assert after[HEADING_X, 0, 0] > 0.0
     assert not after[OPPOSED].any()
+
+
+def test_a_force_against_the_motion_counts_as_far_as_there_is_motion_within_the_memory_of_forces() -> None:
+    turned = [10.0 * LENGTH, -LENGTH]
+    for moved, counts in ((1.0, 1.0 - math.exp(-2.0)), (0.01, 0.0198), (0.0, 0.0)):
+        found = followed([*turned, -moved * LENGTH], (1.0, 0.0))
+        assert found[OPPOSED] == pytest.approx(1.0 + counts, rel=1e-4)
