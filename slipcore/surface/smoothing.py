@@ -4,6 +4,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import dctn, idctn
 from scipy.optimize import brentq
 
@@ -40,16 +41,19 @@ def kernel_width(time: FloatArray, field: FloatArray, least_noise: float) -> flo
 
     What parts a frame from the line between its neighbours in time is noise; how much of that bends from element to
     element shows the kernel. White noise that came after the smoothing hides it. ``least_noise``: below it is motion.
+    Of a dense sensor rows stand for all, for medians of them are sure long before all elements are read.
     """
     n, m = field.shape[1:3]
     if len(time) < SMOOTHING.least_frames or max(n - 2, 0) * max(m - 2, 0) < SMOOTHING.least_elements:
         return 0.0
     chosen = np.unique(np.linspace(1, len(time) - 2, SMOOTHING.frames).astype(int))
     share = ((time[chosen] - time[chosen - 1]) / (time[chosen + 1] - time[chosen - 1]))[:, None, None, None]
-    noise = field[chosen] - (1.0 - share) * field[chosen - 1] - share * field[chosen + 1]
+    rows, share = _bands(n, m), share[..., None]
+    before, now, after = (field[frames[:, None, None], rows] for frames in (chosen - 1, chosen, chosen + 1))
+    noise = now - (1.0 - share) * before - share * after
     if (noise == 0.0).mean() > SMOOTHING.largest_still:  # rounded, or held back
         return 0.0
-    bend = np.diff(np.diff(noise, 2, axis=1), 2, axis=2) / 6.0
+    bend = np.diff(np.diff(noise, 2, axis=2), 2, axis=3) / 6.0
     size = _size(noise)
     if not np.median(size) > least_noise * math.sqrt(1.5):
         return 0.0
@@ -58,6 +62,17 @@ def kernel_width(time: FloatArray, field: FloatArray, least_noise: float) -> flo
         return 0.0
     width: float = brentq(lambda width: bend_of_noise(width) - median, 0.0, SMOOTHING.widest)
     return width
+
+
+def _bands(n: int, m: int) -> NDArray[np.int64]:
+    """Rows of a lattice that are looked at, [bands, rows]: all of them in one band; or, where that shows more than as
+    many elements as the least lattice does in all its frames, evenly chosen ones, each between its neighbours.
+    """
+    enough = SMOOTHING.least_elements * SMOOTHING.frames
+    if (n - 2) * (m - 2) <= enough:
+        return np.arange(n)[None]
+    middle = np.unique(np.linspace(1, n - 2, math.ceil(enough / (m - 2))).astype(int))
+    return middle[:, None] + np.arange(-1, 2)
 
 
 def _size(field: FloatArray) -> FloatArray:
