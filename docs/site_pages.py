@@ -1,5 +1,6 @@
 """Hooks of mkdocs: pages of the root folder join the site, and links to what is no page lead to the repository."""
 
+import html
 import re
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).parents[1]
 JOINED = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
+_ROW = re.compile(r"^\|.*$", re.M)
+_CODE = re.compile(r"`([^`]+)`")
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?://|#)([^)\s]+)\)")
 
 
@@ -21,7 +24,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let each link lead to a page of the site; what is none there (a source file, a folder) is named in place."""
+    """Let each link lead to a page of the site; what is none there (a source file, a folder) is named in place.
+
+    Code in tables has its bars without the backslash that GitHub takes off.
+    """
     folder = ROOT if page.file.src_uri in JOINED else Path(config.docs_dir)
 
     def mended(link: re.Match[str]) -> str:
@@ -34,4 +40,10 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
                 return f"{mark}[{text}]({name}{'#' + anchor if anchor else ''})"
         return f"{text} (`{path.relative_to(ROOT)}`)"
 
-    return _LINK.sub(mended, markdown)
+    return _ROW.sub(lambda row: _CODE.sub(_with_bars, row[0]), _LINK.sub(mended, markdown))
+
+
+def _with_bars(code: re.Match[str]) -> str:
+    """Code in a table whose bars are escaped: mkdocs would show the backslash, which GitHub does not."""
+    bar = r"\|"
+    return f"<code>{html.escape(code[1]).replace(bar, '&#124;')}</code>" if bar in code[1] else code[0]

@@ -22,6 +22,7 @@ from estimators import fitting
 from service import cli
 from slipcore import contact, forces
 from slipcore.contact import reference
+from tests.service.web import chromium
 
 ROOT = Path(__file__).parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), ROOT / "clients" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -156,13 +157,29 @@ def test_every_page_is_in_the_navigation_of_the_site() -> None:
     assert listed == pages
 
 
-def test_the_site_is_built_without_a_warning_and_asks_no_other_host(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", tmp_path]
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", folder]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    html = "".join(page.read_text(encoding="utf-8") for page in tmp_path.rglob("*.html"))
+    return folder
+
+
+def test_the_site_is_built_without_a_warning_and_asks_no_other_host(site: Path) -> None:
+    html = "".join(page.read_text(encoding="utf-8") for page in site.rglob("*.html"))
     assert "slipcore.detect_slip" in html
-    assert re.findall(r"<(?:script|link)[^>]+(?:src|href)=.https?://[^>]+[.](?:js|css)", html) == []
-    assert (tmp_path / "search" / "search_index.js").exists()
+    assert re.findall(r"<script[^>]+src=.https?://[^>]+|<link[^>]+href=.https?://[^>]+[.]css", html) == []
+    assert "<code>stiction materials list|show</code>" in html.replace("&#124;", "|")
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed: apt-get install chromium")
+def test_the_site_is_searched_where_it_was_opened_as_a_file(site: Path, tmp_path: Path) -> None:
+    with chromium.running(tmp_path) as tab:
+        tab.go(f"file://{site}/faq.html")
+        tab.run("document.querySelector('.md-search__input').focus()")
+        tab.call("Input.insertText", text="quantile")
+        assert tab.until("document.querySelectorAll('.md-search-result__item').length") > 1
+        assert (tab.errors, [url for url in tab.requests if url.startswith("http")]) == ([], [])
 
 
 @pytest.mark.parametrize("page", ["README", "docs/slip-benchmark"])
