@@ -157,7 +157,8 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
     if kind in {INTERNAL_ERROR, FILE_MISSING}:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
-    allowed = f"the name of a stored {error.kind}" if kind is not FILE_MISSING else "its copy from a backup, put back"
+    known_by = "id" if kind in {UNKNOWN_GRASP_LOG, UNKNOWN_JOB} else "name"
+    allowed = "its copy from a backup, put back" if kind is FILE_MISSING else f"the {known_by} of a stored {error.kind}"
     return problem_response(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
 
 
@@ -213,6 +214,7 @@ def _allowed(entry: dict[str, Any]) -> str:
         return RULE_OF_PATTERN.get(ctx["pattern"], f"text that matches {ctx['pattern']}").removesuffix(".")
     allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     allowed = re.sub(r"0\.0{4,}\d+", lambda small: f"{float(small[0]):g}", allowed)
+    allowed = allowed.partition(", unable to ")[0]
     return f"a number {allowed}" if kind in BOUNDS and str(entry["input"]).lower() == "nan" else allowed
 
 

@@ -113,6 +113,13 @@ def test_what_the_framework_finds_wrong_is_told_as_any_wrong_value(
         ("string_pattern_mismatch", "a/b", {"pattern": NAME_PATTERN}, "String …", NAME_RULE.removesuffix(".")),
         ("string_pattern_mismatch", "x", {"pattern": "^a$"}, "String should match …", "text that matches ^a$"),
         ("less_than_equal", "nan", {}, "Input should be less than or equal to 1", "a number less than or equal to 1"),
+        (
+            "float_parsing",
+            "x",
+            {},
+            "Input should be a valid number, unable to parse string as a number",
+            "a valid number",
+        ),
         ("greater_than", -1, {}, "Input should be greater than 0.000000000001", "greater than 1e-12"),
     ],
 )

@@ -64,6 +64,7 @@ async def answer_to(error: Exception) -> httpx.Response:
         (StorageUnavailable("database: disk full"), "storage-unavailable", "database: disk full"),
         (NotFound("blob", "00"), "file-missing", "blob is 00; allowed: its copy from a backup, put back"),
         (NotFound("idea", "00"), "internal-error", "idea is 00; allowed: the name of a stored idea"),
+        (NotFound("job", "00"), "unknown-job", "job is 00; allowed: the id of a stored job"),
         (Problem(problems.NOT_READY, "wait"), "not-ready", "wait"),
     ],
     ids=lambda value: type(value).__name__,
