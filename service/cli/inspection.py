@@ -94,10 +94,11 @@ def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstr
 
     if gel is None:
         return log, None
+    described = _read_json(gel, "gel")
     if log.force is not None:
         typer.echo(f"{gel.name}: slip and friction are by the log's own forces", err=True)
         return log, None
-    return with_forces(log, _read_json(gel, "gel"))
+    return with_forces(log, described)
 
 
 def _read_json(path: Path, name: str) -> Mapping[str, Any]:

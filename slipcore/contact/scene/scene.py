@@ -23,11 +23,11 @@ class Scene(SceneDescription):
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """Read a scene file; a bare name is one of the library's."""
-        path = Path(path)
+        asked = path = Path(path)
         if not path.suffix and not path.exists():
             path = LIBRARY / f"{path}.toml"
         if not path.exists():
-            raise InvalidInput("scene", path, "a TOML file, or one of " + ", ".join(library()))
+            raise InvalidInput("scene", asked, "a TOML file, or one of " + ", ".join(library()))
         try:
             entries = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -248,6 +248,7 @@ def test_simulate_explains_a_scene(run: Run) -> None:
 def test_an_unknown_scene_is_refused_with_those_that_exist(run: Run) -> None:
     code, _, err = run("simulate", "crystal_ball")
     assert code == INPUT_REFUSED
+    assert "scene is crystal_ball; allowed: a TOML file, or one of" in err
     assert "lifting_15N" in err
 
 
@@ -263,6 +264,19 @@ def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: l
     code, out, _ = run("fit", *ramps)
     assert code == 0
     assert "β₁ [s/m]" in out
+
+
+def test_a_fit_by_no_method_is_refused_before_a_log_is_looked_at(run: Run) -> None:
+    code, _, err = run("fit", "not there.npz", "--method", "best")
+    assert (code, err.splitlines()[-1].startswith("stiction: method is best; allowed: ols, ")) == (INPUT_REFUSED, True)
+
+
+def test_a_gel_that_cannot_be_read_is_refused_also_of_a_log_with_forces(
+    run: Run, ramps: list[Path], tmp_path: Path
+) -> None:
+    code, _, err = run("detect", ramps[0], "--gel", tmp_path / "gel.json")
+    assert code == INPUT_REFUSED
+    assert "gel.json': No such file" in err
 
 
 def test_fit_counts_a_grasp_once_that_comes_in_two_files(run: Run, ramps: list[Path], tmp_path: Path) -> None:
