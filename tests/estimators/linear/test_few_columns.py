@@ -24,6 +24,7 @@ def test_columns_are_turned_into_singular_vectors(rows: np.ndarray) -> None:
     ids=["two", "one", "twice the same", "none"],
 )  # fmt: skip
 def test_axes_span_the_columns_that_are_not_zero(rows: np.ndarray, rank: int) -> None:
+    rows = np.ascontiguousarray(rows)
     axes = spanned(rows, ALONE)
     assert axes.shape == (len(rows), rank)
     np.testing.assert_allclose(axes.T @ axes, np.eye(rank), atol=1e-14)

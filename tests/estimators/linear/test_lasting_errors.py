@@ -14,7 +14,8 @@ DESIGN = np.linalg.qr(np.column_stack([ALIKE, EVEN]))[0]
 
 
 def covariance_of_levels(level: np.ndarray, weight: np.ndarray = ALIKE) -> np.ndarray:
-    """Of one place."""
+    """Of one place. Levels lie as in a fit: of others the kernel would be compiled anew, in four seconds."""
+    level = np.ascontiguousarray(level)
     own, lasting = errors_of_levels(level[None], EVEN[None] / 1.0, weight[None], CLUSTERS.independent)
     return np.diag(own[0]) + lasting
 
@@ -64,7 +65,9 @@ def test_what_is_left_is_by_the_whole_covariance_matrix(hidden: list[int]) -> No
     own = np.divide(weight[weight > 0.0].mean(), weight, out=np.zeros_like(weight), where=weight > 0.0)
     rows = rng.standard_normal((3, COUNT, 3))
     rows[..., 0] = 1.0
-    square, size = _left.py_func(rows[..., 2], rows[..., 1:2], own, KEPT, OWN)
+    kept, share = KEPT.copy(), OWN.copy()
+    kept.flags.writeable = share.flags.writeable = False  # as constants of a kernel are
+    square, size = _left.py_func(rows[..., 2], rows[..., 1:2], own, kept, share)
     seen = (weight > 0.0).ravel()
     for k, (lasts, share) in enumerate(zip(LASTS, OWN, strict=True)):
         covariance = np.kron(np.eye(3), (1.0 - share) * correlations(lasts)) + share * np.diag(own.ravel())
