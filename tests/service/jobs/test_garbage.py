@@ -132,7 +132,7 @@ def test_the_command_tells_and_only_with_delete_does(
         return int(ending.value.code or 0), capsys.readouterr().out.splitlines()
 
     monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
-    deleted = "0 unreferenced files would be deleted, which are in quarantine for 7 days, 0:00:00"
+    deleted = "0 unreferenced files would be deleted, which are in quarantine for 7 days"
     assert run() == (0, [deleted, "1 unreferenced files would be set aside"])
     assert blobs.has(orphan)
     assert run("--delete") == (0, ["deleted 0 unreferenced files", "set 1 unreferenced files aside"])
