@@ -289,11 +289,16 @@ def test_a_key_logs_in_loads_simulated_grasps_and_logs_out(
 
 @ON_SQLITE
 @pytest.mark.parametrize("width", [1400, 390])
-def test_a_long_name_without_a_space_widens_no_page(page: Tab, client: httpx.Client, fitted: Any, width: int) -> None:
-    name, base = "W" * 100, str(client.base_url).rstrip("/")
-    client.patch(f"/v1/materials/{fitted['material']}", json={"name": name}).raise_for_status()
+def test_a_long_name_without_a_space_widens_no_page(
+    page: Tab, client: httpx.Client, content: bytes, upload: Any, wait: Any, width: int
+) -> None:
+    name, base = f"{width}".ljust(100, "W"), str(client.base_url).rstrip("/")
+    client.post("/v1/materials", json={"name": name}).raise_for_status()
+    accepted = upload(client, content, material=name)
+    wait(client, accepted.json()["job"]["id"])
+    log = client.get(accepted.headers["location"]).json()
     page.resize(width)
-    paths = ("/", "/jobs", f"/materials/{name}", f"/logs/{fitted['id']}", f"/sensors/{fitted['sensor']}", "/audit")
+    paths = ("/", "/jobs", f"/materials/{name}", f"/logs/{log['id']}", f"/sensors/{log['sensor']}", "/audit")
     for path in (*paths, f"/compare?material={name}", f"/plan?material={name}&tangential_load=1&contact_area=6e-5"):
         page.go(f"{base}{path}")
         assert fits(page), path
