@@ -2,6 +2,7 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
 
+import httpx
 import pytest
 
 from db.database import Database
@@ -46,6 +47,24 @@ class Elements(HTMLParser):
 @pytest.fixture(scope="session")
 def elements() -> Callable[[str], Elements]:
     return Elements
+
+
+@pytest.fixture(scope="session")
+def links_of_list() -> Callable[[httpx.Client, str], list[str]]:
+    """What a list links to, on all of its pages: how many there are depends on the tests before."""
+
+    def follow(client: httpx.Client, path: str) -> list[str]:
+        links: list[str] = []
+        after: str | None = path
+        while after is not None:
+            answer = client.get(after, headers=HTML)
+            assert answer.status_code == 200, answer.text
+            found = [given["href"] or "" for tag, given in Elements(answer.text).found if tag == "a"]
+            links += found
+            after = next((httpx.URL(path).join(link) for link in found if "cursor=" in link), None)
+        return links
+
+    return follow
 
 
 @pytest.fixture

@@ -249,9 +249,11 @@ def test_what_a_form_was_sent_comes_back_as_text(browser: Any, elements: Callabl
 
 
 @ON_SQLITE
-def test_jobs_are_listed_with_their_state_and_reason(client: httpx.Client, fitted: Any, elements: Any) -> None:
+def test_jobs_are_listed_with_their_state_and_reason(
+    client: httpx.Client, fitted: Any, elements: Any, links_of_list: Any
+) -> None:
+    assert f"/logs/{fitted['id']}" in links_of_list(client, "/jobs")
     page = elements(client.get("/jobs", headers=HTML).text)
-    assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
     assert any("data-refresh" in given for _, given in page.found)
     assert f"/logs/{fitted['id']}" not in client.get("/jobs?status=failed", headers=HTML).text
 

@@ -145,12 +145,13 @@ def test_what_a_sensor_is_named_is_text(browser: Any, database: Database, elemen
 
 
 @ON_SQLITE
-def test_a_sensor_has_its_logs_with_what_was_found_against_them(client: Any, fitted: Any, elements: Any) -> None:
+def test_a_sensor_has_its_logs_with_what_was_found_against_them(
+    client: Any, fitted: Any, elements: Any, links_of_list: Any
+) -> None:
     log = elements(client.get(f"/logs/{fitted['id']}", headers=HTML).text)
     (link,) = [given["href"] for tag, given in log.found if tag == "a" and given["href"].startswith("/sensors/")]
     assert link == path_of(fitted["sensor"])
-    page = elements(client.get(link, headers=HTML).text)
-    assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
+    assert f"/logs/{fitted['id']}" in links_of_list(client, link)
     logs = client.get("/v1/grasp-logs", params={"sensor": fitted["sensor"], "limit": 1000}).json()["items"]
     listed = client.get("/sensors", headers=HTML).text.partition(f'href="{link}"')[2].partition("</tr>")[0]
     assert f'data-label="Logs">{len(logs)}<' in listed
