@@ -21,6 +21,14 @@ def needs_samples(method: str, grasps: int) -> bool:
     return method not in {"conjugate", "hierarchical"} and (grasps < 2 or method not in {"ols", "bayes"})
 
 
+def check_method(method: str) -> None:
+    """Raises ``InvalidSamples`` for a ``method`` that ``fit`` does not have: before samples are found, which takes
+    long.
+    """
+    if method not in METHODS:
+        raise InvalidSamples("method", method, ", ".join(METHODS))
+
+
 def fit(
     samples: GraspData,
     method: str = "ols",
@@ -49,8 +57,7 @@ def fit(
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.
     """
-    if method not in METHODS:
-        raise InvalidSamples("method", method, ", ".join(METHODS))
+    check_method(method)
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
         if value is not None and not value > 0.0:
             raise InvalidSamples(name, value, "above 0")

@@ -109,13 +109,11 @@ def fit(
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
-    from estimators.method_names import METHODS
+    from estimators.fitting import check_method
     from service.domain.logs.doubtful_logs import with_doubts, with_reconstructed
     from service.domain.logs.same_grasp import Grasps, same_grasp
-    from slipcore import InvalidInput
 
-    if method not in METHODS:  # before all logs are looked at
-        raise InvalidInput("method", method, ", ".join(METHODS))
+    check_method(method)
     grasps = Grasps()
 
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
