@@ -217,14 +217,16 @@ def test_the_api_is_described_without_a_network(page: Tab, client: httpx.Client)
 
 
 @ON_SQLITE
-@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
 def test_nobody_is_kept_out_of_the_api_and_of_a_page_that_is_not_there(
-    tab: Tab, client: httpx.Client, width: int
+    tab: Tab, client: httpx.Client, width: int, scheme: str
 ) -> None:
     base = str(client.base_url).rstrip("/")
     tab.resize(width)
+    tab.prefer(scheme)
     tab.go(f"{base}/docs")
     tab.until("document.querySelectorAll('.opblock').length > 20")
+    assert tab.run("document.documentElement.matches('.dark-mode')") == (scheme == "dark")
     assert [each for each in tab.barriers() if not each.startswith("heading-order (moderate)")] == []
     assert fits(tab)
     for path in ("/nothing", "/live/ended", "/materials/unknown"):
@@ -232,6 +234,7 @@ def test_nobody_is_kept_out_of_the_api_and_of_a_page_that_is_not_there(
         assert tab.run("document.querySelector('.problem') !== null"), path
         assert tab.barriers() == []
         assert fits(tab), path
+    tab.prefer("light")
 
 
 @ON_SQLITE
