@@ -13,6 +13,7 @@ from slipcore.compilation import compiled
 FloatArray = NDArray[np.float64]
 
 EPSILON = float(np.finfo(float).eps)
+TINY = float(np.finfo(float).tiny)
 TURNS = 60
 """Of pairs of columns, at most: two or three make them orthogonal."""
 

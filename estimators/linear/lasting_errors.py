@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import LASTING, OWN_SHARES
+from estimators.linear.few_columns import TINY
 from slipcore.compilation import compiled
 
 FloatArray = NDArray[np.float64]
@@ -23,7 +24,6 @@ OWN = np.array([1.0, *(own for _ in LASTING for own in OWN_SHARES)])
 """How long errors last and the part of their variance that each stretch has for itself; first all of it."""
 KEPT = np.exp(-1.0 / LASTS)
 """What is kept of lasting errors from one stretch to the next."""
-TINY = np.finfo(float).tiny
 TOGETHER = 4
 """Factors of a determinant under one logarithm: of 1e77 at most each."""
 

@@ -9,13 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.linear.few_columns import from_one, power, spanned, times
+from estimators.linear.few_columns import TINY, from_one, power, spanned, times
 from slipcore.compilation import compiled
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-TINY = float(np.finfo(float).tiny)
 
 
 class Sums(NamedTuple):
@@ -33,11 +31,11 @@ class Sums(NamedTuple):
 
 class WithinPlaces(NamedTuple):
     """What samples [k] say within places: orthonormal ``axes`` [k, d] of what of v and f_n varies, what (v, f_n, μ) are
-    along them, ``told`` [d, 3]; the ``residual`` [k], and its ``size``, 0 where it is rounding.
+    along them, ``components`` [d, 3]; the ``residual`` [k], and its ``size``, 0 where it is rounding.
     """
 
     axes: FloatArray
-    told: FloatArray
+    components: FloatArray
     residual: FloatArray
     size: float
 
@@ -61,18 +59,18 @@ def seen_within(
             if math.sqrt(varied[column]) > rounding * math.sqrt(size[column]):
                 rows[k, column] = root[k] * deviation[k, column]
     axes = spanned(rows, alone)
-    told = np.zeros((axes.shape[1], 3))
+    components = np.zeros((axes.shape[1], 3))
     for i in range(axes.shape[1]):
         for k in range(samples):
-            told[i, 0] += axes[k, i] * rows[k, 0]
-            told[i, 1] += axes[k, i] * rows[k, 1]
-            told[i, 2] += axes[k, i] * root[k] * deviation[k, 2]
+            components[i, 0] += axes[k, i] * rows[k, 0]
+            components[i, 1] += axes[k, i] * rows[k, 1]
+            components[i, 2] += axes[k, i] * root[k] * deviation[k, 2]
         for k in range(samples):
-            residual[k] -= axes[k, i] * told[i, 2]
+            residual[k] -= axes[k, i] * components[i, 2]
     for k in range(samples):
         left += residual[k] * residual[k]
     return WithinPlaces(
-        axes, told, residual, math.sqrt(left) if math.sqrt(left) > rounding * math.sqrt(size[2]) else 0.0
+        axes, components, residual, math.sqrt(left) if math.sqrt(left) > rounding * math.sqrt(size[2]) else 0.0
     )
 
 

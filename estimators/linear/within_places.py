@@ -32,12 +32,13 @@ def within_places(
 
     root = np.sqrt(weight)
     seen = seen_within(np.ascontiguousarray(values), deviation, root, CLUSTERS.alone, ROUNDING)
-    seen.told[:, :2] = calibrated(seen.told[:, :2], noise)
-    shares = (np.eye(len(seen.told)),) * 2
-    if len(seen.told) and seen.size > 0.0:
+    seen.components[:, :2] = calibrated(seen.components[:, :2], noise)
+    shares = (np.eye(len(seen.components)),) * 2
+    if len(seen.components) and seen.size > 0.0:
         shares = _fewer(sums_of(seen.axes, seen.residual / seen.size, root, _stretches(time), place), len(root))
     left = np.append(np.zeros(2), np.linalg.norm(seen.residual))
-    beside, alone = (np.asarray(upper_triangle(np.vstack([share @ seen.told, left])), dtype=float) for share in shares)
+    rows = (np.vstack([share @ seen.components, left]) for share in shares)
+    beside, alone = (np.asarray(upper_triangle(each), dtype=float) for each in rows)
     return beside, alone
 
 
