@@ -1,6 +1,7 @@
 """Traction on a known support, with its covariance: Bayesian regression by QR, which squares no condition number."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -130,7 +131,7 @@ class TractionFit:
 def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: TractionPrior) -> TractionFit:
     """The posterior on a ``support`` [k] under a known prior."""
     q, r = observation.on(support)
-    root = prior.strength * factors(nodes.places()[support], nodes.grid.pitch[0], prior.smoothness)
+    root = prior.strength * factors_on(nodes, support, prior.smoothness)
     j = root.shape[1]
     stacked = np.concatenate((times(r, root), np.eye(3 * j)))
     inner, outer = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
@@ -160,7 +161,7 @@ def log_evidence(
     that the strength of a wide contact would speak against all smaller ones.
     """
     response, reached = condensed(*observation.whitened(support, data))
-    spectrum = Spectrum.of(times(response, factors(nodes.places()[support], nodes.grid.pitch[0], shape)), reached)
+    spectrum = Spectrum.of(times(response, factors_on(nodes, support, shape)), reached)
     strength = spectrum.choose(0.0, len(reached), "evidence")
     return spectrum.log_evidence(strength) + 0.5 * float(spectrum.y @ spectrum.y), TractionPrior(shape, strength)
 
@@ -182,10 +183,9 @@ def choose_prior(
     r, y = condensed(*observation.whitened(support, data))
     whitened = data / observation.noise
     rest, count = max(float(whitened @ whitened - y @ y), 0.0), int(np.isfinite(observation.noise).sum())
-    places, pitch = nodes.places()[support], nodes.grid.pitch[0]
 
     def evaluate(shape: Smoothness, by: Criterion) -> tuple[float, float]:
-        spectrum = Spectrum.of(times(r, factors(places, pitch, shape)), y)
+        spectrum = Spectrum.of(times(r, factors_on(nodes, support, shape)), y)
         strength = spectrum.choose(rest, count, by)
         return spectrum.log_evidence(strength), strength
 
@@ -195,10 +195,18 @@ def choose_prior(
     evidence = evaluate(best, "evidence")[0]
     for name, values in choices().items():
         for value in () if name == "shear" and best.shear < min(values) else values:
-            other = best._replace(**{name: value})
+            changed: dict[str, Any] = {name: value}
+            other = best._replace(**changed)
             if other != best and (found := evaluate(other, "evidence")[0]) > evidence:
                 best, evidence = other, found
     return TractionPrior(best, evaluate(best, criterion)[1])
+
+
+def factors_on(nodes: Nodes, support: BoolArray, shape: Smoothness) -> FloatArray:
+    """``factors`` [3, j, j] of a prior of this ``shape`` at the nodes of a ``support`` [k], of which j are."""
+    places = nodes.places()
+    rim = places[nodes.beside(support)] if shape.falls else None
+    return factors(places[support], nodes.grid.pitch[0], shape, rim)
 
 
 def times(r: FloatArray, root: FloatArray) -> FloatArray:

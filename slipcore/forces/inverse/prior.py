@@ -11,12 +11,13 @@ from slipcore.frames import FloatArray
 class Smoothness(NamedTuple):
     """Shape of the prior: correlation lengths of ``pressure`` and of ``traction``, in pitches (Matérn 3/2: slopes
     exist, curvature need not), and the standard deviation of either tangential component as a ``shear`` of that of
-    pressure.
+    pressure; ``falls``: whether pressure is known to fall to zero at the nodes around its support.
     """
 
     pressure: float
     traction: float
     shear: float
+    falls: bool = False
 
 
 def usual() -> Smoothness:
@@ -31,7 +32,7 @@ def of_depth_alone() -> Smoothness:
 
 def choices() -> dict[str, tuple[float, ...]]:
     """Values of each property of a prior's shape among which the data choose."""
-    pressure, traction, shear = usual()
+    pressure, traction, shear, _ = usual()
     return {
         "pressure": (pressure / PRIOR.length_factor, pressure, pressure * PRIOR.length_factor),
         "traction": (traction / PRIOR.length_factor, traction, traction * PRIOR.length_factor),
@@ -39,13 +40,18 @@ def choices() -> dict[str, tuple[float, ...]]:
     }
 
 
-def factors(places: FloatArray, pitch: float, smoothness: Smoothness) -> FloatArray:
+def factors(places: FloatArray, pitch: float, smoothness: Smoothness, rim: FloatArray | None = None) -> FloatArray:
     """L [3, k, k], lower triangular: L Lᵀ is the prior covariance of q_x, q_y and p at ``places`` [k, 2] m, for a
-    pressure of standard deviation 1.
+    pressure of standard deviation 1, in root mean square where it is zero at a ``rim`` [r, 2] m.
     """
-    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) / pitch
-    traction = smoothness.shear * _factor(apart / smoothness.traction)
-    return np.stack((traction, traction, _factor(apart / smoothness.pressure)))
+    around = places[:0] if rim is None else rim
+    known, whole = len(around), np.concatenate((around, places))
+    apart = np.hypot(*(whole[:, None] - whole[None]).transpose(2, 0, 1)) / pitch
+    traction = smoothness.shear * _factor(apart[known:, known:] / smoothness.traction)
+    pressure = _factor(apart / smoothness.pressure)[known:, known:]
+    if known:
+        pressure *= np.sqrt(len(places)) / np.linalg.norm(pressure)
+    return np.stack((traction, traction, pressure))
 
 
 def _factor(apart: FloatArray) -> FloatArray:

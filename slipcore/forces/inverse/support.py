@@ -7,7 +7,7 @@ node's variance is estimated with its neighbours' (Fang et al., IEEE Trans. Sign
 is found so; how much comes from a fit on that support.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +61,9 @@ def better_support(
     """Supports that explain data [m] best, the most probable first and none much less probable than it, under priors
     of this shape: among those that grow, shrink or close row by row from one, and those whose rim is then cut
     where pressures are.
+
+    Behind the first the same supports stand again with pressure that falls to zero at their rim, if that is as
+    probable: on a wide support a pressure that is as likely there as in the middle makes forces too large.
     """
     near = observation.within(binary_dilation(support).ravel(), data)
     judged = _judged([support], *near, nodes, shape)
@@ -75,8 +78,16 @@ def better_support(
         near = observation.within(binary_dilation(best.support).ravel(), data)
     judged += _judged([*cut(*near, nodes, best.support, shape)], *near, nodes, shape)
     different = {each.support.tobytes(): each for each in judged}.values()
-    least = max(map(_probability, judged)) + np.log(SUPPORT.least_probability)
-    return sorted((each for each in different if each.log_probability >= least), key=_probability, reverse=True)
+    likely = _likely(different)
+    falling = _judged([each.support for each in likely], *near, nodes, shape._replace(falls=True))
+    return [likely[0], *(each for each in _likely([*likely, *falling]) if each is not likely[0])]
+
+
+def _likely(candidates: Iterable[SupportCandidate]) -> list[SupportCandidate]:
+    """Those that are not much less probable than the most probable one, which comes first."""
+    found = sorted(candidates, key=_probability, reverse=True)
+    least = found[0].log_probability + np.log(SUPPORT.least_probability)
+    return [each for each in found if each.log_probability >= least]
 
 
 def _judged(

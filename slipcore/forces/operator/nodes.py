@@ -3,11 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import NODES
-from slipcore.frames import FloatArray
+from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,11 @@ class Nodes:
     def places(self) -> FloatArray:
         """Of the nodes, [k, 2] m."""
         return np.stack([axis.ravel() for axis in self.grid.points()], axis=-1)
+
+    def beside(self, support: BoolArray) -> BoolArray:
+        """Nodes [k] that are not of a ``support`` [k], but next to it along x or y."""
+        whole = support.reshape(self.grid.shape)
+        return np.asarray((binary_dilation(whole) & ~whole).ravel())
 
     def over_elements(self, position: FloatArray) -> FloatArray:
         """Force (N) on the square elements around ``position`` [j, 2] by 1 Pa at each node, [j, k].

@@ -120,9 +120,32 @@ def test_supports_that_data_cannot_tell_apart_are_all_told() -> None:
     loaded = np.zeros((9, 8), dtype=bool)
     loaded[2:6, 2:5] = True
     clear, blurred = (better_support(*directly_seen(loaded, noise), LATTICE, loaded, usual()) for noise in (0.01, 0.4))
-    assert len(clear) == 1
-    assert len(blurred) > 2
-    assert len({each.support.tobytes() for each in blurred}) == len(blurred)
+    assert len({each.support.tobytes() for each in clear}) == 1
+    assert len({each.support.tobytes() for each in blurred}) > 2
+    assert len({(each.support.tobytes(), each.prior.smoothness) for each in blurred}) == len(blurred)
     probability = np.array([each.log_probability for each in blurred])
-    assert (np.diff(probability) <= 0.0).all()
-    assert probability[-1] >= probability[0] + np.log(SUPPORT.least_probability)
+    assert (np.diff(probability[1:]) <= 0.0).all()
+    assert probability[-1] >= probability.max() + np.log(SUPPORT.least_probability)
+    assert blurred[0].log_probability == max(
+        each.log_probability for each in blurred if not each.prior.smoothness.falls
+    )
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_pressure_that_falls_to_a_rim_speaks_for_a_prior_that_does(falls: bool) -> None:
+    """The support that is told first is by the usual prior all the same."""
+    y, x = np.mgrid[:9, :8]
+    away = np.hypot(x - 3.5, y - 4.0) / 3.6
+    loaded = away < 1.0
+    pressure = np.where(loaded, np.sqrt(np.maximum(1.0 - away**2, 0.0)) if falls else 0.7, 0.0)
+    observation, data = directly_seen(loaded, 0.05)
+    data[2 * loaded.size :] += 0.4 * (pressure - loaded).ravel()
+    shape = usual()._replace(falls=falls)
+    log_usual, log_falling = (
+        log_evidence(observation, data, LATTICE, loaded.ravel(), usual()._replace(falls=each))[0]
+        for each in (False, True)
+    )
+    assert (log_falling > log_usual) == falls
+    found = better_support(observation, data, LATTICE, loaded, usual())
+    assert not found[0].prior.smoothness.falls
+    assert max(found, key=lambda each: each.log_probability).prior.smoothness == shape
