@@ -154,6 +154,24 @@ class ContradictionDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TurningDefaults(Options):
+    """When forces without normals turn with the surface (``surface/turning.py``)."""
+
+    least_share: Annotated[float, Option(0.0, 1.0, "-", "0.6 in presses on a half-space with ν = 0.4, of friction")] = (
+        0.7
+    )
+    """λ from which on they turn."""
+    band: Annotated[float, Option(0.0, 1.0, "-", "about what λ changes by in a grasp")] = 0.1
+    """By which it must fall below that before a stream takes them not to turn any more."""
+    coupling: Annotated[float, Option(0.0, 10.0, "-", "ν of 0.3 to 0.49, layers from 2.5 mm: 0.8 to 1.9 do")] = 1.5
+    """By how much of what a load changes in λ this is carried on."""
+    least_load: Annotated[float, Option(1e-3, 1.0, "-", "well below friction, well above noise of sums")] = 0.1
+    """Tangential load over normal force, about which λ under load becomes known."""
+    deviations: Annotated[float, Option(0.0, 100.0, "-", "3 σ; carried on, three times as noisy")] = 10.0
+    """Of noise of the forces, by which λ must lie above the least share."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ReconstructedForcesDefaults(Options):
     """How method "filter" takes forces that follow from displacement (``detection/reconstructed_forces.py``)."""
 
@@ -299,13 +317,25 @@ NORMAL_95 = 1.959963984540054
 NOISE = NoiseDefaults()
 SMOOTHING = SmoothingDefaults()
 CONTRADICTION = ContradictionDefaults()
+TURNING = TurningDefaults()
 NUMERICS = NumericsDefaults()
 RECONSTRUCTED_FORCES = ReconstructedForcesDefaults()
 MARKERS = MarkerDefaults()
 SATURATION = SaturationDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
-TABLES = (NOISE, SMOOTHING, CONTRADICTION, RECONSTRUCTED_FORCES, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
+TABLES = (
+    NOISE,
+    SMOOTHING,
+    CONTRADICTION,
+    TURNING,
+    RECONSTRUCTED_FORCES,
+    NUMERICS,
+    MARKERS,
+    SATURATION,
+    PATCHES,
+    COLLECTION,
+)
 """What is not an option of a method."""
 
 

@@ -96,7 +96,7 @@ class GraspLog:
 
     Shapes and units: ``time`` [t] s, strictly increasing, gaps allowed; ``position`` [n, m, 3] m, markers at rest;
     ``displacement`` [t, n, m, 3] m; ``element_area`` m²; ``force`` [t, n, m, 3] N on each element by the object, or
-    None; ``normal`` [t, n, m, 3], outward unit vectors, or None (then taken from the deformed shape); ``object_pose``
+    None; ``normal`` [t, n, m, 3], outward unit vectors, or None (then see ``normals_of``); ``object_pose``
     [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None; ``contact`` [t, n, m] bool where it is
     known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
     no marker shows the element, and its displacement is a placeholder that only neighbours' derivatives may see;

@@ -53,8 +53,9 @@ LAYOUT = {
     "slipcore/contact/solver/tangent_space.py": {"FIELDS"},
     "slipcore/detection/filter/slip_limit.py": {"SCRATCH_ROWS", "_BLOCK"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
-    "slipcore/detection/shared/lasting_noise.py": {"SPREAD", "STEP", "ROWS", "OF_STENCIL", "OF_QUARTILE"},
+    "slipcore/detection/shared/lasting_noise.py": {"SPREAD", "STEP", "TURNING", "ROWS", "OF_STENCIL", "OF_QUARTILE"},
     "slipcore/patch/regions.py": {"NOWHERE"},
+    "slipcore/surface/turning.py": {"SUMS"},
     "estimators/sampling/proposal.py": {"TINY"},
 }
 """Names of rows, states and mathematical constants."""

@@ -25,6 +25,7 @@ WHOLE_TABLES = {
     "slipcore.RECONSTRUCTED_FORCES": "of reconstructed forces, which the page's logs do not have",
     "slipcore.CONTRADICTION": "needs logs with faulty forces; tests/slipcore/detection has them",
     "slipcore.NOISE": "compiled kernels hold it fixed",
+    "slipcore.TURNING": "compiled kernels hold it fixed",
     "slipcore.NUMERICS": "compiled kernels hold it fixed",
     "slipcore.contact.PROJECTION": "compiled kernels hold it fixed",
 }

@@ -134,8 +134,10 @@ def _detected(session: DetectorSession, frame: Frame) -> tuple[SlipState, dict[s
         session.detector.set_options(**for_reconstructed_forces(session.forces.deviation))
     state = session.detector.step(*frame)
     try:
+        if session.grip is None:
+            return state, None
         sampled = None if session.forces is None else session.forces.sampled
-        return state, None if session.grip is None else session.grip.step(frame, state, sampled)
+        return state, session.grip.step(frame._replace(normal=session.detector.normals), state, sampled)
     except InvalidInput:
         session.detector.state = before
         raise

@@ -21,6 +21,7 @@ from slipcore.frames import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
+from slipcore.surface.log_normals import with_normals
 
 
 def detect_slip(
@@ -52,7 +53,7 @@ def detect_slip(
         options = {**known, **options}
     if log.force_deviation and method == DEFAULT_METHOD:
         options = {**for_reconstructed_forces(log.force_deviation), **options}
-    log, mended = agreeing(log)
+    log, mended = agreeing(with_normals(log))
     kernel_width = options.pop("kernel_width", 0.0)
     estimated = {}
     if method == DEFAULT_METHOD:

@@ -17,7 +17,7 @@ from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.contact import ContactThreshold
 from slipcore.detection.shared.decision import decide_frame
 from slipcore.detection.shared.interface import CompiledMethod, ObservedFrame, Start
-from slipcore.detection.shared.lasting_noise import start_noise
+from slipcore.detection.shared.lasting_noise import TURNING, start_noise
 from slipcore.detection.shared.observe import observe_frame
 from slipcore.detection.shared.records import (
     NO_FIELD,
@@ -27,6 +27,7 @@ from slipcore.detection.shared.records import (
     FrameArrays,
     Memory,
     empty_like,
+    for_setup,
     plain,
     read_only,
     shared_workspace,
@@ -47,7 +48,9 @@ from slipcore.frames import (
     check_pose,
 )
 from slipcore.slip_state import SlipState
+from slipcore.surface.log_normals import normals_of_shape
 from slipcore.surface.strain import Lattice
+from slipcore.surface.turning import SUMS
 
 
 class Setup(NamedTuple):
@@ -91,10 +94,7 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
         start = found.start(lattice, chosen)
     else:
         of_method = found.init(lattice, chosen)
-    position_at_rest, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
-    # copies that can be written to, as unpickled ones can: kernels are compiled for one type
-    touch = touch_thresholds(chosen, area)
-    sensor = DetectorSetup(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
+    sensor = DetectorSetup(*for_setup(lattice), *touch_thresholds(chosen, area), start.settings)
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = start_noise()
@@ -215,6 +215,16 @@ class SlipDetector:
     def noise(self) -> float:
         """Estimated standard deviation of one marker coordinate, m; NaN while it cannot be estimated."""
         return self.state.noise
+
+    @property
+    def normals(self) -> FloatArray:
+        """Outward normals [n, m, 3] at which forces are split: those of the last frame where it gave any, else of the
+        surface at rest, or of the deformed one once forces were seen to turn with it.
+        """
+        setup, frame, turned = self.state.setup, self.state.frame, self.state.memory.noise[TURNING, SUMS] > 0.0
+        if frame.normal.size:
+            return frame.normal
+        return normals_of_shape(setup.lattice.position, frame.displacement[None])[0] if turned else setup.sensor.normal
 
     @property
     def findings(self) -> tuple[Finding, ...]:

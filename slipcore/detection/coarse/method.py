@@ -33,6 +33,7 @@ from slipcore.detection.shared.records import (
     FrameArrays,
     Memory,
     empty_like,
+    for_setup,
     read_only,
     shared_workspace,
     unwritten,
@@ -109,8 +110,7 @@ def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
     """The lattice and options for the filter's kernel; contact is known, and only what pulls follows from them."""
     touch = np.array(ContactThreshold(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
     settings = by_place.METHOD.start(lattice, FilterOptions()).settings
-    position, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
-    return DetectorSetup(position, steps, inverse, lattice.orientation, touch, touch, settings)
+    return DetectorSetup(*for_setup(lattice), touch, touch, settings)
 
 
 def findings(state: CoarseState) -> tuple[Finding, ...]:

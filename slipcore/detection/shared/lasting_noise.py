@@ -12,9 +12,11 @@ from slipcore.noise import ranked, recent_median, remember
 SERIES = NOISE.series
 _MEMORY, _LEAST, _LEVELS, _INNER = NOISE.memory, NOISE.least_step, NOISE.step_levels, NOISE.least_inner
 _FINEST, _BEND = NOISE.finest_step, NOISE.field_bend
-SPREAD, STEP = 9, 10
-"""Rows of a memory's noise, behind those of ``observe.step_noise``: a ring of estimates, and the step, m."""
-ROWS = 11
+SPREAD, STEP, TURNING = 9, 10, 11
+"""Rows of a memory's noise, behind those of ``observe.step_noise``: a ring of estimates, the step, m, and what tells
+whether forces turn with the surface (``surface.turning``): sums, and whether they do.
+"""
+ROWS = 12
 OF_STENCIL = 6.0
 """Standard deviation of ``bend`` for white noise of 1: √Σ of its squared weights 1, −2, 1 over 1, −2, 1."""
 OF_QUARTILE = 0.31864
@@ -36,7 +38,7 @@ def step_lasting(
     from its neighbours', m, NaN while unknown, and the steps in which places are given, in the plane and in depth, m, 0
     if there is none. ``series`` [2, k]: room.
     """
-    after[SPREAD:] = noise[SPREAD:]
+    after[SPREAD:TURNING] = noise[SPREAD:TURNING]
     if fresh:
         remember(after[SPREAD], noise_between_neighbours(displacement, series.ravel()))
         seek_steps(displacement, after[STEP], series)

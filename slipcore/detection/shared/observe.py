@@ -5,11 +5,12 @@ import math
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE, SMOOTHING
 from slipcore.detection.shared.contact import TOUCH, ContactThreshold, find_contact, spatial_noise
-from slipcore.detection.shared.lasting_noise import OF_STEP, step_lasting
+from slipcore.detection.shared.lasting_noise import OF_STEP, TURNING, step_lasting
 from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace, named
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
 from slipcore.surface.normals import split_forces, surface_normals
+from slipcore.surface.turning import SUMS, add_turning, turns
 
 SERIES, _STALE, _MOVED, _LEAST_NOISE = (
     NOISE.series,
@@ -43,16 +44,23 @@ def observe(
     move. Otherwise contact is by shape. Without forces normals are only worked out if the method ``needs_normals``.
     """
     normal, pressing, tangential, stays, noise = room.surface
+    learns = frame.force.size > 0 and frame.normal.size == 0
     if frame.normal.size:
         normal[:] = frame.normal
     elif needs_normals or frame.force.size:
         surface_normals(sensor.rest_steps, sensor.orientation, frame.displacement, normal)
+    if learns:
+        turn_back(sensor.position, sensor.normal, frame.force, before.noise[TURNING], after.noise[TURNING], normal)
+    else:
+        after.noise[TURNING] = before.noise[TURNING]
     if frame.force.size:
         split_forces(frame.force, normal, pressing, tangential)
     else:
         indent(frame.displacement, pressing)
         tangential[:] = 0.0
     noise[0], noise[1] = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise, room.series)
+    if learns:
+        step_turns(noise[1], after.noise[TURNING])
     fresh = after.noise[2, 2] > before.noise[2, 2]
     between, step, step_of_depth = step_lasting(before.noise, frame.displacement, fresh, after.noise, room.series)
     noise[2], noise[3] = between, step
@@ -77,6 +85,30 @@ def observe(
         for j in range(m):
             stays[i, j] = contact[i, j] and was[i, j]
     return frame.force.size > 0 and believed
+
+
+@compiled
+def turn_back(
+    position: FloatArray,
+    rest: FloatArray,
+    force: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    normal: FloatArray,
+) -> None:
+    """Make the ``normal`` [n, m, 3] of the deformed shape that at ``rest``, unless forces [n, m, 3] N turned so far by
+    the row ``before``; and keep in the row ``after`` what this frame says of that, too.
+    """
+    after[:] = before
+    add_turning(position, rest, normal, force, after[:SUMS])
+    if before[SUMS] == 0.0:
+        normal[:] = rest
+
+
+@compiled
+def step_turns(noise: float, after: FloatArray) -> None:
+    """Keep in the row ``after`` whether forces turn, by its sums and the ``noise`` of the forces, N."""
+    after[SUMS] = turns(after[:SUMS], noise, after[SUMS] > 0.0)
 
 
 @compiled

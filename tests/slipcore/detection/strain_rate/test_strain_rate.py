@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from slipcore import GraspLog, StrainRateOptions, detect_slip
-from slipcore.detection.shared.records import Decision, DetectorSetup, Surface, read_only
+from slipcore.detection.shared.records import Decision, DetectorSetup, Surface, for_setup, read_only
 from slipcore.detection.strain_rate import step as kernel
 from slipcore.detection.strain_rate.method import start
 from slipcore.detection.strain_rate.reference import signed_rate, surface_strain
@@ -33,8 +33,7 @@ def step(
     normal = np.broadcast_to([0.0, 0.0, 1.0], displacement.shape).copy()
     after, decision = np.empty_like(elements), Decision(np.empty(stays.shape, bool), np.empty(stays.shape))
     rest, nothing = lattice(), np.zeros(stays.shape)
-    at_rest = map(np.array, (rest.position, rest.steps, rest.inverse_jacobian))  # written to or not as in ``init``
-    sensor = DetectorSetup(*at_rest, 1.0, np.zeros(0), np.zeros(0), start(rest, OPTIONS).settings)
+    sensor = DetectorSetup(*for_setup(rest), np.zeros(0), np.zeros(0), start(rest, OPTIONS).settings)
     surface = Surface(normal, nothing, nothing, stays, np.array([noise, np.nan]))
     step_strain_rate(sensor, read_only(displacement), surface, interval, elements, after, decision)
     np.testing.assert_array_equal(decision.probability, decision.slip)
