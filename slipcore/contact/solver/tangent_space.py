@@ -5,8 +5,9 @@ A cell slides if a gradient step from it leaves its disk; it may move along its 
 Loops over cells are compiled, without branches so that they run in vectors, and fused: at 64² cells a call of numpy
 costs as much as its arithmetic. Fields in them are flat, of n cells.
 
-Conjugate gradients run in single precision, in units of a cell's own compliance and of the largest slip that is left:
-they go to a share of that alone, and each Newton step finds anew what is left, in double precision.
+Conjugate gradients keep fields in single precision, in units of a cell's own compliance and of the largest slip that
+is left: they go to a share of that alone, and each Newton step finds anew what is left, in double precision. The space
+stays in double precision: near the limit surface a rigid motion hardly lies in it, and single precision loses that.
 """
 
 from typing import Any
@@ -27,8 +28,8 @@ the rigid motions in the space, curvature [n] of the limits (a sliding cell's sl
 FIELDS = 7
 """What ``survey`` fills: the projector (3), what first moves sliding cells onto their circles (2), curvature, scale."""
 SingleArray = NDArray[np.float32]
-SingleSpace = tuple[SingleArray, SingleArray, SingleArray, SingleArray, SingleArray]
-"""The same in single precision, with the curvature in units of a cell's own compliance."""
+ScaledSpace = tuple[FloatArray, FloatArray, FloatArray, SingleArray, SingleArray]
+"""The same with the curvature in units of a cell's own compliance; that and the scale in single precision."""
 _CIRCLE_ROUNDING, _RANK = TANGENTIAL.circle_rounding, TANGENTIAL.rank
 Taken = tuple[int, int, int]
 """How often the operator was applied, how often in single precision, and how often its inverse."""
@@ -184,7 +185,7 @@ def newton_move(
     top = largest(left)
     if not 0.0 < top < np.inf:
         return move, (int(moved), 0, 0)
-    change, count = _conjugate_gradients(_single(space, stiffness), _shares(left, top), by[1:], bounds[2:])
+    change, count = _conjugate_gradients(_scaled(space, stiffness), _shares(left, top), by[1:], bounds[2:])
     _add(m, change.reshape(2, -1), stiffness * top)
     return move, (count + moved, count, count + 1)
 
@@ -200,14 +201,14 @@ def _restrict_slip(space: Space, slip: FloatArray, made: FloatArray, left: Float
 
 
 @compiled
-def _single(space: Space, stiffness: float) -> SingleSpace:
-    """A space in single precision."""
+def _scaled(space: Space, stiffness: float) -> ScaledSpace:
+    """A space in the units and precisions of conjugate gradients."""
     projector, arm, inverse_gram, curvature, scale = space
     stiff, scales = np.empty(scale.size, dtype=np.float32), np.empty(scale.size, dtype=np.float32)
     for i in range(scale.size):
         stiff[i] = min(curvature[i] * stiffness, _STIFFEST)
         scales[i] = max(scale[i], 1.0 / np.sqrt(_STIFFEST))
-    return projector.astype(np.float32), arm.astype(np.float32), inverse_gram.astype(np.float32), stiff, scales
+    return projector, arm, inverse_gram, stiff, scales
 
 
 @compiled
@@ -242,7 +243,7 @@ def _excess(target: FloatArray, traction: FloatArray, move: FloatArray, arm: Flo
 
 @compiled
 def _conjugate_gradients(
-    space: SingleSpace, residual: SingleArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
+    space: ScaledSpace, residual: SingleArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
 ) -> tuple[SingleArray, int]:
     """The move [2, ny, nx] that takes a ``residual``, which is overwritten, to zero; how often it took the operator."""
     (operator, preconditioner), (reduction, most) = by, bounds
@@ -264,7 +265,7 @@ def _conjugate_gradients(
             i[k, j] = space[4][j] * r[k, j]
     convolve(image, improved, preconditioner)
     size, motion = _improve(space, r, g)
-    first, share, count = size, np.float32(0.0), 0
+    first, share, count = size, 0.0, 0
     while count < most and size > 0.0:
         _turn(space[0], space[1], motion, d, g, share)
         convolve(direction, image, operator)
@@ -281,12 +282,12 @@ def _conjugate_gradients(
 
 @compiled
 def _advance(
-    space: SingleSpace,
+    space: ScaledSpace,
     move: SingleArray,
     residual: SingleArray,
     direction: SingleArray,
     image: SingleArray,
-    size: np.float32,
+    size: float,
 ) -> None:
     """One conjugate-gradient step in place; ``image``: the operator on ``direction``, then the new residual, scaled for
     the preconditioner.
@@ -298,10 +299,10 @@ def _advance(
 
 @compiled(fastmath=VECTOR)
 def _stiffen(
-    projector: SingleArray, arm: SingleArray, curvature: SingleArray, direction: SingleArray, image: SingleArray
-) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
+    projector: FloatArray, arm: FloatArray, curvature: SingleArray, direction: SingleArray, image: SingleArray
+) -> tuple[float, tuple[float, float, float]]:
     """Restrict C·direction to the space and add the curvature, in place; direction·image, and its resultants."""
-    product = sx = sy = sm = np.float32(0.0)
+    product = sx = sy = sm = 0.0
     for i in range(direction.shape[1]):
         ax, ay, dx, dy = image[0, i], image[1, i], direction[0, i], direction[1, i]
         px = projector[0, i] * ax + projector[1, i] * ay + curvature[i] * dx
@@ -316,12 +317,12 @@ def _stiffen(
 
 @compiled(fastmath=VECTOR)
 def _go_on(
-    projector: SingleArray,
-    arm: SingleArray,
+    projector: FloatArray,
+    arm: FloatArray,
     scale: SingleArray,
-    motion: SingleArray,
+    motion: FloatArray,
     fields: tuple[SingleArray, SingleArray, SingleArray, SingleArray],
-    step: np.float32,
+    step: float,
 ) -> None:
     """Add a step along a direction to the move, and its image without a rigid motion to the residual, in place; scale
     the latter into the image.
@@ -339,7 +340,7 @@ def _go_on(
 
 
 @compiled
-def _improve(space: SingleSpace, residual: SingleArray, improved: SingleArray) -> tuple[np.float32, SingleArray]:
+def _improve(space: ScaledSpace, residual: SingleArray, improved: SingleArray) -> tuple[float, FloatArray]:
     """Scale a preconditioned residual and restrict it to the space, in place; its product with the residual, and the
     rigid motion whose part in the space has its resultants.
 
@@ -352,10 +353,10 @@ def _improve(space: SingleSpace, residual: SingleArray, improved: SingleArray) -
 
 @compiled(fastmath=VECTOR)
 def _restrict_scaled(
-    projector: SingleArray, arm: SingleArray, scale: SingleArray, residual: SingleArray, move: SingleArray
-) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
+    projector: FloatArray, arm: FloatArray, scale: SingleArray, residual: SingleArray, move: SingleArray
+) -> tuple[float, tuple[float, float, float]]:
     """Scale a move and restrict it to the space, in place; its product with the residual, and its resultants."""
-    product = sx = sy = sm = np.float32(0.0)
+    product = sx = sy = sm = 0.0
     for i in range(move.shape[1]):
         mx, my = scale[i] * move[0, i], scale[i] * move[1, i]
         px = projector[0, i] * mx + projector[1, i] * my
@@ -370,12 +371,12 @@ def _restrict_scaled(
 
 @compiled(fastmath=VECTOR)
 def _turn(
-    projector: SingleArray,
-    arm: SingleArray,
-    motion: SingleArray,
+    projector: FloatArray,
+    arm: FloatArray,
+    motion: FloatArray,
     direction: SingleArray,
     improved: SingleArray,
-    share: np.float32,
+    share: float,
 ) -> None:
     """The next conjugate direction, in place: a share of the last less what is improved without a rigid motion."""
     mx, my, yaw = motion[0], motion[1], motion[2]

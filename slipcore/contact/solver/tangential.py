@@ -141,7 +141,7 @@ class _TangentialStep:
             here, before, first = self._at(self.project(self._from_coarse(traction))[0]), residual, 1
             residual = self._residual(here)
         residual, iterations = self._go_on(here, (before, residual), tolerance, (first, max_iterations))
-        if not residual <= tolerance or iterations == max_iterations:
+        if not residual <= tolerance:
             raise NotConverged("tangential contact", residual, tolerance, iterations)
         result = self._result(here, residual, iterations)
         return self._at_the_limit(result) if result.sliding and self.given.all() else result

@@ -67,8 +67,8 @@ def test_force_above_the_sliding_force_is_refused_with_how_far(share: float) -> 
     assert 1.0 / error.value.factor == pytest.approx(share, rel=1e-10)
 
 
-@pytest.mark.parametrize("angle", [0.1, 0.8, 1.5])
-def test_force_and_moment_inside_on_and_outside_the_limit_surface(angle: float) -> None:
+def edge_of_sliding(angle: float) -> np.ndarray:
+    """The largest load [N, N, N m] with a force along x and a moment in the ratio of a direction's parts."""
     grid = Grid.square(32, 11e-3)
     x, y = grid.points()
     pressure = solve_normal(Operators((body(),)), grid, bowl(x, y), force=FORCE, tolerance=1e-9).pressure
@@ -76,7 +76,12 @@ def test_force_and_moment_inside_on_and_outside_the_limit_surface(angle: float) 
     arm = np.stack((x.ravel(), y.ravel())) / 5e-3
     direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
     factor = limit_load(limit, arm, direction, np.ones(3, dtype=bool)).factor * grid.cell_area
-    edge = factor * direction * [1.0, 1.0, 5e-3]
+    return np.asarray(factor * direction * [1.0, 1.0, 5e-3])
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.8, 1.5])
+def test_force_and_moment_inside_on_and_outside_the_limit_surface(angle: float) -> None:
+    edge = edge_of_sliding(angle)
     for share in (0.99, 1 - 1e-4, 1 - 1e-7):
         assert follow(problem(), [at(FORCE), at(FORCE, *(share * edge))])[-1].force[0].sum() == pytest.approx(
             share * edge[0], rel=1e-9
@@ -84,6 +89,14 @@ def test_force_and_moment_inside_on_and_outside_the_limit_surface(angle: float) 
     with pytest.raises(InfeasibleLoad) as error:
         follow(problem(), [at(FORCE), at(FORCE, *(1.01 * edge))])
     assert 1.0 / error.value.factor == pytest.approx(1.01, rel=1e-6)
+
+
+@pytest.mark.parametrize("left", [1e-6, 1e-7, 1e-8])
+@pytest.mark.parametrize("angle", [1.5, 1.55])
+def test_a_load_close_to_the_limit_of_torsion_takes_as_few_rounds_as_others(angle: float, left: float) -> None:
+    """Nearly all cells move along their circles then, and a turn hardly lies in what they may do."""
+    last = follow(problem(), [at(FORCE), at(FORCE, *((1.0 - left) * edge_of_sliding(angle)))])[-1]
+    assert last.iterations <= 10
 
 
 def test_a_moment_on_a_single_cell_is_refused() -> None:

@@ -141,7 +141,7 @@ def test_stiffening_restricts_and_adds_the_curvature() -> None:
     space = Found(traction, slip, limit, 0.5, arm)
     direction = space.balanced(slip)
     expected = tangent(space, answer) + space.curvature * direction
-    projector, places, _, curvature, _ = compiled._single(space.space, 1.0)
+    projector, places, _, curvature, _ = compiled._scaled(space.space, 1.0)
     image = single(answer)
     product, sums = compiled._stiffen(projector, places, curvature, single(direction), image)
     np.testing.assert_allclose(image, flat(expected), rtol=0.0, atol=1e-5)
@@ -164,7 +164,7 @@ def test_advancing_moves_updates_the_residual_and_scales_it() -> None:
     response = tangent(space, answer) + space.curvature * direction
     step = 0.25 / inner(direction, response)
     move, image, left = single(np.zeros_like(slip)), single(answer), single(residual)
-    compiled._advance(compiled._single(space.space, 1.0), move, left, single(direction), image, np.float32(0.25))
+    compiled._advance(compiled._scaled(space.space, 1.0), move, left, single(direction), image, 0.25)
     np.testing.assert_allclose(move, flat(step * direction), rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(left, flat(space.balanced(residual + step * response)), rtol=0.0, atol=1e-4)
     np.testing.assert_allclose(image, space.scale.ravel() * left, rtol=1e-6)
@@ -174,10 +174,10 @@ def test_improving_scales_restricts_and_multiplies_and_turning_balances() -> Non
     traction, slip, limit, arm, improved = case(7)
     space = Found(traction, slip, limit, 0.5, arm)
     residual, direction, better = space.balanced(slip), single(improved), single(improved)
-    expected, halves = space.balanced(space.scale * improved), compiled._single(space.space, 1.0)
-    product, motion = compiled._improve(halves, single(residual), better)
+    expected, scaled = space.balanced(space.scale * improved), compiled._scaled(space.space, 1.0)
+    product, motion = compiled._improve(scaled, single(residual), better)
     np.testing.assert_allclose(product, inner(residual, expected), rtol=1e-5)
-    compiled._turn(halves[0], halves[1], motion, direction, better, np.float32(0.3))
+    compiled._turn(scaled[0], scaled[1], motion, direction, better, 0.3)
     np.testing.assert_allclose(direction, flat(0.3 * improved - expected), rtol=0.0, atol=1e-5)
 
 
@@ -186,7 +186,7 @@ def test_single_precision_holds_any_curvature() -> None:
     space = Found(traction, slip, limit, 0.5, arm)
     space.curvature[space.slides] = 1e300
     space.scale[space.slides] = 1e-150
-    _, _, _, curvature, scale = compiled._single(space.space, 0.5)
+    _, _, _, curvature, scale = compiled._scaled(space.space, 0.5)
     assert np.isfinite(curvature).all()
     assert (scale > 0.0).all()
     sliding = space.slides.ravel()
