@@ -51,11 +51,11 @@ def keeps_contact(
 ) -> bool:
     """Whether elements touch as they did, since all was held in the last frame and the load has not changed since.
 
-    By noise of forces, and by noise of markers that lasts, elements at the rim come and go, and each would begin at the
-    place that the jitter of the fitted pose gives it: a random walk of the pose, which ends the hold. A contact that is
-    given is that. ``noise``: variance of a marker coordinate m², and deviation of an element's force N.
+    By noise that lasts elements at the rim of a shape come and go, and each would begin at the place that the jitter of
+    the fitted pose gives it: a random walk of the pose. ``noise``: variance of a marker coordinate m², and deviation of
+    an element's force N. Contact by forces is known better, and one that is given is that.
     """
-    if frame.contact.size or common[STILL] <= tuning.hold_time or not (has_force or common[LASTING] > 0.0):
+    if has_force or frame.contact.size or common[LASTING] == 0.0 or common[STILL] <= tuning.hold_time:
         return False
     load, variance = load_of(frame, has_force, noise[0], noise[1], tuning)
     return not changed(load, variance, tuning, common)
