@@ -167,7 +167,7 @@ class TurningDefaults(Options):
     """By how much of what a load changes in λ this is carried on."""
     least_load: Annotated[float, Option(1e-3, 1.0, "-", "well below friction, well above noise of sums")] = 0.1
     """Tangential load over normal force, about which λ under load becomes known."""
-    deviations: Annotated[float, Option(0.0, 100.0, "-", "3 σ; carried on, three times as noisy")] = 10.0
+    deviations: Annotated[float, Option(0.0, 100.0, "-", "recordings, whose forces ring; 10 is 3 σ")] = 20.0
     """Of noise of the forces, by which λ must lie above the least share."""
 
 

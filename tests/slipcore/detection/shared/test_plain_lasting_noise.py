@@ -7,7 +7,16 @@ import pytest
 
 from slipcore.defaults import NOISE
 from slipcore.detection.shared import lasting_noise
-from slipcore.detection.shared.lasting_noise import OF_QUARTILE, OF_STENCIL, OF_STEP, ROWS, SERIES, SPREAD, STEP
+from slipcore.detection.shared.lasting_noise import (
+    OF_QUARTILE,
+    OF_STENCIL,
+    OF_STEP,
+    ROWS,
+    SERIES,
+    SPREAD,
+    STEP,
+    TURNING,
+)
 from tests.slipcore.plain_kernels import as_plain_python
 
 
@@ -104,7 +113,7 @@ def test_a_frame_that_is_not_fresh_changes_nothing_of_what_is_remembered() -> No
     told = lasting_noise.step_lasting(noise, field, False, after, series)
     assert math.isnan(told[0])
     assert told[1:] == (0.0, 0.0)
-    assert not after[SPREAD:].any()
+    assert not after[SPREAD:TURNING].any()
     assert (after[:SPREAD] == 9.0).all()  # not its rows
     told = lasting_noise.step_lasting(noise, field, True, after, series)
     first = lasting_noise.noise_between_neighbours(field, np.empty(2 * SERIES))
