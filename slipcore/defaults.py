@@ -508,6 +508,8 @@ class FilterOptions(ContactOptions):
     """Time constant of what is learnt about it."""
     ratio_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.2
     """Weight of the log-odds from the force ratio; 0 leaves them out."""
+    ratio_motion: Annotated[float, Option(0.0, 1.0, "m", "tuning scenes: 30 to 300 nm differ by 0.0003")] = 1e-7
+    """Motion of the object within the memory of forces by which their ratio counts; 0: it counts in each frame."""
     ratio_limit: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 6.0
     """Largest log-odds from one force ratio."""
     ratio_slip: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.85

@@ -82,7 +82,7 @@ def observe(world: World, state: ElementsState, finger: int = 0, generator: np.r
     if generator is not None:
         displacement = displacement + world.marker_noise * generator.standard_normal(displacement.shape)
         force = force + world.force_noise * generator.standard_normal(force.shape)
-    return Frame(state.time, displacement, force, None)
+    return Frame(state.time, displacement, force, None, world.normal)
 
 
 def stick_ratio(world: World, state: ElementsState, finger: int = 0) -> float:  # noqa: ARG001

@@ -183,7 +183,7 @@ class _Sensor:
 
     def __call__(self, frame: Frame) -> Observation:
         """A frame as a controller takes it."""
-        found = self.detector.step(frame.time, frame.displacement, frame.force)
+        found = self.detector.step(frame.time, frame.displacement, frame.force, normal=frame.normal)
         slip = found.slip & self.seen
         told = dataclasses.replace(found, slip=slip, stick_ratio=stick_ratio(found.contact, slip))
         self.observer, seen = self.observer.step(frame, told)

@@ -94,6 +94,11 @@ class World:
         return np.stack([*np.meshgrid(*axes, indexing="ij"), np.zeros(points)], axis=-1)
 
     @property
+    def normal(self) -> FloatArray:
+        """Outward normals that forces refer to, [n, m, 3]: loads act on the undeformed plane, as in a simulated log."""
+        return np.broadcast_to([0.0, 0.0, 1.0], (*self.sampling.points, 3))
+
+    @property
     def element_area(self) -> float:
         """Area of an element, m²."""
         return self.sampling.pitch**2
@@ -196,7 +201,7 @@ def observe(world: World, state: WorldState, finger: int = 0, generator: np.rand
     if generator is not None:
         displacement = displacement + world.marker_noise * generator.standard_normal(displacement.shape)
         force = force + world.force_noise * generator.standard_normal(force.shape)
-    return Frame(state.time, displacement, force, None)
+    return Frame(state.time, displacement, force, None, world.normal)
 
 
 def stick_ratio(world: World, state: WorldState, finger: int = 0) -> float:

@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.loading import low_pass
-from slipcore.detection.filter.state import FRICTION, NORMAL, OPPOSED, PROBABILITY, RATIO, RATIO_WEIGHT, TANGENTIAL
+from slipcore.detection.filter.pose import AnchorMotion
+from slipcore.detection.filter.state import (
+    FRICTION,
+    NORMAL,
+    OPPOSED,
+    PROBABILITY,
+    RATIO,
+    RATIO_WEIGHT,
+    SPEED,
+    TANGENTIAL,
+)
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import Surface
 from slipcore.elementary import logarithms, logarithms_of_normal_cdf
@@ -111,6 +121,27 @@ def weigh_forces(
         opposed = after[OPPOSED, i, j]
         counts = (opposed - 1.0 if opposed > 0.0 else 1.0) if after[NORMAL, i, j] > least else 0.0
         evidence.log_odds[e] = counts * weight * min(max(evidence.log_odds[e], -most), most)
+
+
+@compiled
+def count_by_motion(
+    motion: AnchorMotion, interval: float, gain: float, tuning: Tuning, common: FloatArray, log_odds: FloatArray
+) -> None:
+    """Let ``log_odds`` [k] count as far as the object moved within the memory of forces, once per ``ratio_motion``: a
+    ratio at rest is told once and not in each frame, for all may have stuck again since it was reached.
+
+    ``gain`` of this step, of ``interval`` s, in that memory, by which the speed is low-passed, too.
+    """
+    squares = 0.0
+    for e in range(len(motion.x)):
+        squares += motion.x[e] * motion.x[e] + motion.y[e] * motion.y[e]
+    speed = math.sqrt(squares / max(len(motion.x), 1)) / interval
+    common[SPEED] += gain * (speed - common[SPEED])
+    if not tuning.ratio_motion > 0.0:
+        return
+    share = -math.expm1(-common[SPEED] * interval / (gain * tuning.ratio_motion))
+    for e in range(len(log_odds)):
+        log_odds[e] *= share
 
 
 @compiled

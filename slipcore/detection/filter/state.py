@@ -76,4 +76,6 @@ LASTING = RESOLUTION + 1
 """Noise of markers that lasts from frame to frame, m, where it is more than what three frames show; else 0."""
 LIMIT_LIKELIHOODS = LASTING + 1
 """[NUMERICS.slip_limits + 1] Log-likelihoods of the limits of slip, and of there being none (``slip_limit``)."""
-COMMON = LIMIT_LIKELIHOODS + NUMERICS.slip_limits + 1
+SPEED = LIMIT_LIKELIHOODS + NUMERICS.slip_limits + 1
+"""Root mean square speed of the object over the elements, low-passed as forces are, m/s."""
+COMMON = SPEED + 1

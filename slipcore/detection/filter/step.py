@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Estimates, Increment, Measurements, update_elements
-from slipcore.detection.filter.force_ratio import ForceEvidence, follow_forces, keep_ratios, weigh_forces
+from slipcore.detection.filter.force_ratio import (
+    ForceEvidence,
+    count_by_motion,
+    follow_forces,
+    keep_ratios,
+    weigh_forces,
+)
 from slipcore.detection.filter.heading import follow_headings
 from slipcore.detection.filter.hold import keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
@@ -103,6 +109,7 @@ def step_elements(
     follow_forces(elements, room.surface, has_force, gain, after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, gain, after.elements)
     look_at_forces(elements, places, compared, held, noise, tuning, evidence, after)
+    count_by_motion(motion, noise[0], gain, tuning, common, evidence.log_odds)
     start_elements(position, frame.displacement, shift, stays, pose, variance, after)
     begins = not (restick or math.isnan(room.surface.noise[0]))  # slip does not before noise is known
     find_readiness(elements, after.contact, places, begins, tuning, room.weight, seen.readiness)

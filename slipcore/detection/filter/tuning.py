@@ -56,6 +56,7 @@ class Tuning(NamedTuple):
     ratio_difference: float
     ratio_memory: float
     ratio_weight: float
+    ratio_motion: float
     ratio_limit: float
     ratio_slip: float
     ratio_slip_of_element: float

@@ -36,6 +36,7 @@ def test_an_object_at_rest_is_that_of_the_reduced_world() -> None:
     assert seen.force.sum(axis=(0, 1)) == pytest.approx([0.7 * FRICTION * FORCE, 0.0, -FORCE], abs=1e-3)
     for one, other, share in ((seen.displacement, expected.displacement, 0.06), (seen.force, expected.force, 0.2)):
         assert np.linalg.norm(one - other) < share * np.linalg.norm(other)
+    np.testing.assert_array_equal(seen.normal, expected.normal)
     assert state.slipped[0] < 1e-8
 
 

@@ -65,6 +65,19 @@ def test_the_controller_recognises_in_the_reduced_world(friction: float, name: s
     assert lifted.slipped[-1, 0] < 1e-5
 
 
+@pytest.mark.parametrize("seed", [32, 34])
+def test_under_a_twist_the_detector_tells_what_sticks(seed: int) -> None:
+    """Frames tell the normals that forces refer to: by those of the shape, pressure leans and counts as shear."""
+    twisted = next(task for task in PAPER if "twisted" in task.name)
+
+    def harder(seen: Observation) -> float:
+        return 3.0 + 1.2 * seen.time
+
+    done = run(twisted, world_of(twisted, seed), [harder], seed)
+    assert done.stick_ratio[-1, 0] > 0.8
+    assert np.sqrt(np.nanmean((done.told - done.stick_ratio) ** 2)) < 0.12
+
+
 def test_a_detector_that_misses_all_slip_tells_that_all_sticks() -> None:
     task = dataclasses.replace(TASK, seconds=1.0)
     world = world_of(task, 0)

