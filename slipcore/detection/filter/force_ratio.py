@@ -137,7 +137,7 @@ def count_by_motion(
         squares += motion.x[e] * motion.x[e] + motion.y[e] * motion.y[e]
     speed = math.sqrt(squares / max(len(motion.x), 1)) / interval
     common[SPEED] += gain * (speed - common[SPEED])
-    if not tuning.ratio_motion > 0.0:
+    if not (tuning.ratio_motion > 0.0 and interval < math.inf):  # before the first frame nothing has moved
         return
     share = -math.expm1(-common[SPEED] * interval / (gain * tuning.ratio_motion))
     for e in range(len(log_odds)):

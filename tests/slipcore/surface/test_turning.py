@@ -132,7 +132,7 @@ def test_a_stream_finds_out_while_it_is_pressed(short_ramp: GraspLog, turned: fl
         told.append(bool(detector.state.memory.noise[TURNING, SUMS]))
     pressed = whole.contact.any(axis=(1, 2)).argmax()
     assert sum(np.diff(told)) == (turned == SHAPE)  # once or never
-    assert told[pressed + 3 :] == [turned == SHAPE] * len(told[pressed + 3 :])
+    assert told[pressed + 4 :] == [turned == SHAPE] * len(told[pressed + 4 :])
     assert (np.array(slip) == whole.slip).mean() > 0.999
     if turned == REST:
         np.testing.assert_array_equal(slip, whole.slip)
