@@ -880,7 +880,7 @@ class CheckOptions(Options):
     """Largest angle between the directions of forces and of markers."""
     no_load: Annotated[float, Option(0.0, 10.0, "-", "well below any friction coefficient")] = 0.1
     """Ratio of the contact's tangential load, force and moment, to its normal force below which it is unloaded."""
-    sideways_share: Annotated[float, Option(0.0, 10.0, "-", "scenes up to 0.20, recordings 0.34 and 0.36")] = 0.25
+    sideways_share: Annotated[float, Option(0.0, 10.0, "-", "scenes up to 0.20, a recording that pivots 0.26")] = 0.25
     """Largest sum of the elements' tangential forces over the normal force, without load."""
     travel: Annotated[float, Option(0.0, 1e3, "elements", "the centre of force errs by a fraction of one")] = 2.0
     """How much further than its markers a contact's centre may travel."""
@@ -890,9 +890,9 @@ class CheckOptions(Options):
     """Friction below which some axis is taken to be in another unit."""
     largest_friction: Annotated[float, Option(1.0, 1e3, "-", "clean rubber on glass 2, rarely more")] = 3.0
     """Friction above which the same is."""
-    friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.44 to 0.53")] = 0.3
+    friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.25 to 0.50")] = 0.3
     """Largest change of friction from the quarter of samples with the least force to that with the most."""
-    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.20 to 0.31")] = 0.15
+    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.17 and 0.30")] = 0.15
     """Largest standard deviation of friction between elements, as a share of it."""
     scatter_share: Annotated[float, Option(0.0, 10.0, "-", "as for the scatter between elements")] = 0.15
     """Largest standard deviation of friction about a law of speed and force, as a share of friction."""

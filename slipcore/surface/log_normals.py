@@ -19,7 +19,7 @@ def normals_of(log: GraspLog) -> FloatArray:
     shape = normals_of_shape(log.position, log.displacement)
     if log.force is None or _turn(log, shape):
         return shape
-    return np.broadcast_to(Lattice.at_rest(log.position).normal, log.force.shape)
+    return np.broadcast_to(normals_at_rest(log.position), log.force.shape)
 
 
 def with_normals(log: GraspLog) -> GraspLog:
@@ -27,6 +27,12 @@ def with_normals(log: GraspLog) -> GraspLog:
     if log.force is None or log.normal is not None or not log.has_displacement:
         return log
     return replace(log, normal=normals_of(log))
+
+
+def normals_at_rest(position: FloatArray) -> FloatArray:
+    """Outward normals [n, m, 3] of a surface whose markers lie at rest at ``position`` [n, m, 3] m; raises as above."""
+    (normal,) = normals_of_shape(position, np.zeros((1, *np.shape(position))))
+    return np.asarray(normal)
 
 
 def normals_of_shape(position: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -48,7 +54,7 @@ def _turn(log: GraspLog, shape: FloatArray) -> bool:
     from slipcore.surface.turning import SUMS, turning_over_time, turns
 
     assert log.force is not None
-    sums, rest = np.zeros(SUMS), Lattice.at_rest(log.position).normal
-    turning_over_time(log.position, rest, shape, log.force, sums)
-    noise = float(np.nan_to_num(estimate_noise(log.time, log.force[..., 2].reshape(len(log), 1, -1))))
+    sums = np.zeros(SUMS)
+    turning_over_time(log.position, normals_at_rest(log.position), shape, log.force, sums)
+    noise = float(estimate_noise(log.time, log.force[..., 2].reshape(len(log), 1, -1)))
     return turns(sums, noise, did=False)

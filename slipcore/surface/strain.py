@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
-from slipcore.frames import FloatArray, check_position, unit
+from slipcore.frames import FloatArray, check_position
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,13 +44,6 @@ class Lattice:
         inverse = np.array([[y_j, -x_j], [-y_i, x_i]]) / determinant
         steps.flags.writeable = inverse.flags.writeable = False
         return cls(rest, steps, inverse, orientation)
-
-    @property
-    def normal(self) -> FloatArray:
-        """Outward unit normals at rest, [n, m, 3]."""
-        along, across = np.moveaxis(self.steps, 1, -1)
-        normal = unit(np.cross(along, across))
-        return np.asarray(self.orientation * normal)
 
     @property
     def strain_noise(self) -> FloatArray:

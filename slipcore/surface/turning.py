@@ -40,7 +40,7 @@ def add_turning(place: FloatArray, rest: FloatArray, normal: FloatArray, force: 
             square += dx * dx + dy * dy + dz * dz
             turn_x, turn_y, turn_z = turn_x + p * dx, turn_y + p * dy, turn_z + p * dz
             side_x, side_y, side_z = side_x + p * tx, side_y + p * ty, side_z + p * tz
-            r, s = place[i, j, 0], place[i, j, 1]
+            r, s = place[i, j, 0] - place[0, 0, 0], place[i, j, 1] - place[0, 0, 1]  # wherever the lattice lies
             weight, x, y, polar = weight + p * p, x + p * p * r, y + p * p * s, polar + p * p * (r * r + s * s)
             moment += p * (r * ty - s * tx)
     if not weight > 0.0:
@@ -68,7 +68,7 @@ def turning_over_time(
 @compiled
 def turns(sums: FloatArray, noise: float, did: bool) -> bool:
     """Whether forces turn, by the ``sums`` [4] of ``add_turning``, their standard ``noise`` N (NaN: unknown), and
-    whether they ``did`` so far; not where nothing tells.
+    whether they ``did`` so far; not where nothing shows it.
 
     λ of the frames under load is carried on by ``TURNING.coupling`` times what it parts from that of all frames: the
     share of friction that keeps the gel from spreading has fallen to about two thirds there.

@@ -128,7 +128,7 @@ def count_by_motion(
     motion: AnchorMotion, interval: float, gain: float, tuning: Tuning, common: FloatArray, log_odds: FloatArray
 ) -> None:
     """Let ``log_odds`` [k] count as far as the object moved within the memory of forces, once per ``ratio_motion``: a
-    ratio at rest is told once and not in each frame, for all may have stuck again since it was reached.
+    ratio at rest counts once and not in each frame, for all may have stuck again since it was reached.
 
     ``gain`` of this step, of ``interval`` s, in that memory, by which the speed is low-passed, too.
     """

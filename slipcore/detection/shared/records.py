@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from slipcore.compilation import borrowed, compiled
 from slipcore.defaults import NOISE
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.log_normals import normals_at_rest
 from slipcore.surface.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -29,8 +30,8 @@ NO_FIELD, NO_MASK, NO_POSE = (read_only(np.empty(s, t)) for s, t in (((0, 0, 3),
 
 
 class DetectorSetup(NamedTuple):
-    """What stays the same over a stream: the lattice and its ``normal`` at rest (see ``strain.Lattice``), what an
-    element needs to touch by force and by shape (``ContactThreshold`` as arrays) and the method's options as an array.
+    """What stays the same over a stream: the lattice (see ``strain.Lattice``), its ``normal`` at rest [n, m, 3], what
+    an element needs to touch by force and by shape (``ContactThreshold`` as arrays) and the method's options as one.
     """
 
     position: FloatArray
@@ -47,10 +48,8 @@ def for_setup(lattice: Lattice) -> tuple[FloatArray, FloatArray, FloatArray, flo
     """What ``DetectorSetup`` has of a lattice: copies that can be written to, as unpickled ones can, for kernels are
     compiled for one type.
     """
-    position, steps, inverse, normal = map(
-        np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian, lattice.normal)
-    )
-    return position, steps, inverse, lattice.orientation, normal
+    position, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
+    return position, steps, inverse, lattice.orientation, normals_at_rest(lattice.position)
 
 
 class FrameArrays(NamedTuple):

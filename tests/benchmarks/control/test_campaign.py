@@ -66,8 +66,8 @@ def test_the_controller_recognises_in_the_reduced_world(friction: float, name: s
 
 
 @pytest.mark.parametrize("seed", [32, 34])
-def test_under_a_twist_the_detector_tells_what_sticks(seed: int) -> None:
-    """Frames tell the normals that forces refer to: by those of the shape, pressure leans and counts as shear."""
+def test_under_a_twist_the_detector_finds_what_sticks(seed: int) -> None:
+    """Frames have the normals that forces refer to: by those of the shape, pressure leans and counts as shear."""
     twisted = next(task for task in PAPER if "twisted" in task.name)
 
     def harder(seen: Observation) -> float:

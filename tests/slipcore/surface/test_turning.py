@@ -8,8 +8,7 @@ import pytest
 from slipcore import GraspLog, SlipDetector, collect_samples, detect_slip
 from slipcore.detection.shared.lasting_noise import TURNING
 from slipcore.frames import unit
-from slipcore.surface.log_normals import normals_of, normals_of_shape, with_normals
-from slipcore.surface.strain import Lattice
+from slipcore.surface.log_normals import normals_at_rest, normals_of, normals_of_shape, with_normals
 from slipcore.surface.turning import SUMS
 from tests.slipcore.conftest import grid
 
@@ -48,7 +47,7 @@ def grasp(turned: float, coupling: float = 0.0, load: float = 0.9, torque: float
 def turn(log: GraspLog) -> bool:
     """Whether the log's forces are split at the normals of its shape."""
     found = normals_of(log)
-    at_rest = np.array_equal(found, np.broadcast_to(Lattice.at_rest(log.position).normal, found.shape))
+    at_rest = np.array_equal(found, np.broadcast_to(normals_at_rest(log.position), found.shape))
     assert at_rest or np.array_equal(found, normals_of_shape(log.position, log.displacement))
     return not at_rest
 
@@ -57,7 +56,7 @@ def turn(log: GraspLog) -> bool:
 @pytest.mark.parametrize("torque", [0.0, 1.0])
 @pytest.mark.parametrize("coupling", [-1.0, -0.5, 0.0, 0.5, 0.9])
 @pytest.mark.parametrize("turned", [REST, SHAPE])
-def test_forces_that_turn_are_told_from_friction_that_keeps_the_gel_in_shape(
+def test_forces_that_turn_are_distinguished_from_friction_that_keeps_the_gel_in_shape(
     turned: float, coupling: float, torque: float, noise: float
 ) -> None:
     assert turn(grasp(turned, coupling, torque=torque, noise=noise)) == (turned == SHAPE)
@@ -87,7 +86,7 @@ def test_a_lattice_that_is_curved_at_rest_has_normals_of_its_own(turned: float) 
     flat = grasp(REST, load=0.0)
     position = PLACE - (PLACE**2).sum(axis=-1, keepdims=True) / 60e-3 * np.array([0.0, 0.0, 1.0])
     shape = normals_of_shape(position, flat.displacement)
-    at_rest = Lattice.at_rest(position).normal
+    at_rest = normals_at_rest(position)
     assert flat.force is not None
     log = replace(flat, position=position, force=flat.force[..., 2:] * (shape if turned else at_rest))
     assert turn(log) == (turned == SHAPE)

@@ -116,7 +116,7 @@ def test_a_contact_that_is_cut_on_one_side_alone_is_found(beside: int) -> None:
     assert (found & ~loaded).sum() <= 4 * (beside - 1) + 1
 
 
-def test_supports_that_data_cannot_tell_apart_are_all_told() -> None:
+def test_supports_that_data_cannot_distinguish_are_all_returned() -> None:
     loaded = np.zeros((9, 8), dtype=bool)
     loaded[2:6, 2:5] = True
     clear, blurred = (better_support(*directly_seen(loaded, noise), LATTICE, loaded, usual()) for noise in (0.01, 0.4))
@@ -133,7 +133,7 @@ def test_supports_that_data_cannot_tell_apart_are_all_told() -> None:
 
 @pytest.mark.parametrize("falls", [False, True])
 def test_pressure_that_falls_to_a_rim_speaks_for_a_prior_that_does(falls: bool) -> None:
-    """The support that is told first is by the usual prior all the same."""
+    """The support that comes first is by the usual prior all the same."""
     y, x = np.mgrid[:9, :8]
     away = np.hypot(x - 3.5, y - 4.0) / 3.6
     loaded = away < 1.0
