@@ -4,10 +4,10 @@ import math
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.pose import Anchors, Pose, PoseVariance, place_of_object, pose_at
-from slipcore.detection.filter.state import HELD_FRAMES, HELD_LOAD, HELD_POSE, LASTING, STILL
+from slipcore.detection.filter.state import HELD_FORCE, HELD_FRAMES, HELD_LOAD, HELD_POSE, LASTING, STILL
 from slipcore.detection.filter.tuning import Tuning
-from slipcore.detection.shared.records import FrameArrays
-from slipcore.frames import FloatArray
+from slipcore.detection.shared.records import FrameArrays, Surface
+from slipcore.frames import BoolArray, FloatArray
 
 
 @compiled(inline=True)
@@ -49,16 +49,41 @@ def step_hold(
 def keeps_contact(
     frame: FrameArrays, noise: tuple[float, float], has_force: bool, tuning: Tuning, common: FloatArray
 ) -> bool:
-    """Whether elements touch as they did, since all was held in the last frame and the load has not changed since.
+    """Whether elements touch as they did, but for noise: all was held in the last frame and the load has not changed.
 
-    By noise that lasts elements at the rim of a shape come and go, and each would begin at the place that the jitter of
-    the fitted pose gives it: a random walk of the pose. ``noise``: variance of a marker coordinate m², and deviation of
-    an element's force N. Contact by forces is known better, and one that is given is that.
+    By noise of forces, and by noise of markers that lasts, elements at the rim come and go, and each would begin at the
+    place that the jitter of the fitted pose gives it: a random walk of the pose, which ends the hold. ``noise``:
+    variance of a marker coordinate m², and deviation of an element's force N. A contact that is given is that.
     """
-    if has_force or frame.contact.size or common[LASTING] == 0.0 or common[STILL] <= tuning.hold_time:
+    if frame.contact.size or common[STILL] <= tuning.hold_time or not (has_force or common[LASTING] > 0.0):
         return False
     load, variance = load_of(frame, has_force, noise[0], noise[1], tuning)
     return not changed(load, variance, tuning, common)
+
+
+@compiled
+def hold_contact(elements: FloatArray, before: BoolArray, surface: Surface, most: float, contact: BoolArray) -> None:
+    """Let elements touch as ``before`` [n, m] whose normal force lies within ``most``, N, of its mean in this hold.
+
+    Any other has changed: a body may roll, pivot or slide under a load that does not.
+    """
+    n, m = before.shape
+    for i in range(n):
+        for j in range(m):
+            if abs(surface.pressing[i, j] - elements[HELD_FORCE, i, j]) <= most:
+                contact[i, j] = before[i, j]
+            surface.stays[i, j] = contact[i, j] and before[i, j]
+
+
+@compiled
+def follow_held_forces(elements: FloatArray, pressing: FloatArray, frames: float, after: FloatArray) -> None:
+    """Each element's mean normal force [n, m] over the ``frames`` since all is held, the last one of them this."""
+    share = 1.0 / max(frames, 1.0)
+    n, m = pressing.shape
+    for i in range(n):
+        for j in range(m):
+            mean = elements[HELD_FORCE, i, j]
+            after[HELD_FORCE, i, j] = mean + share * (pressing[i, j] - mean)
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Layout of the filter's memory: the rows of ``elements`` [20, n, m] and the entries of ``common`` [COMMON].
+"""Layout of the filter's memory: the rows of ``elements`` [21, n, m] and the entries of ``common`` [COMMON].
 
 Both are arrays (``records.Memory``), for compiled steps fill them in place; the names here are their fields. A field of
 ``common`` with more than one entry begins at its name, and the next field begins where it ends.
@@ -6,7 +6,7 @@ Both are arrays (``records.Memory``), for compiled steps fill them in place; the
 
 from slipcore.defaults import NOISE, NUMERICS
 
-ROWS = 20
+ROWS = 21
 (
     PROBABILITY,  # of slip
     STICK_X,  # place in the object's frame if the element sticks, m
@@ -28,6 +28,7 @@ ROWS = 20
     SPRING_X,  # what it has taken up of the object's motion since then, m (``slip_limit``)
     SPRING_Y,
     EXPECTED,  # log-odds of slip that follow from that
+    HELD_FORCE,  # mean of its normal force since all is held, N
 ) = range(ROWS)
 
 POSE = 0

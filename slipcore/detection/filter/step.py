@@ -15,7 +15,7 @@ from slipcore.detection.filter.force_ratio import (
     weigh_forces,
 )
 from slipcore.detection.filter.heading import follow_headings
-from slipcore.detection.filter.hold import keeps_contact, step_hold
+from slipcore.detection.filter.hold import follow_held_forces, hold_contact, keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, PoseVariance, object_motion, place_on_object
@@ -25,6 +25,7 @@ from slipcore.detection.filter.state import (
     END,
     EXPECTED,
     FORCE_FRAMES,
+    HELD_FRAMES,
     LASTING,
     ONSET,
     POSE,
@@ -66,9 +67,11 @@ def step_filter(
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
         after.common[DOUBTED_FRAMES] += 0.0 if has_force else 1.0
-    if keeps_contact(frame, noise_of_frame(room.surface, tuning), has_force, tuning, before.common):
-        after.contact[:] = before.contact
-        room.surface.stays[:] = before.contact
+    noise = noise_of_frame(room.surface, tuning)
+    if keeps_contact(frame, noise, has_force, tuning, before.common):
+        spread = noise[1] * math.sqrt(1.0 + 1.0 / before.common[HELD_FRAMES])
+        most = tuning.hold_deviations * spread if has_force else math.inf
+        hold_contact(before.elements, before.contact, room.surface, most, after.contact)
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last says nothing
         after.elements[ONSET] = after.elements[END] = 0.0
@@ -107,6 +110,7 @@ def step_elements(
     restick = restick_under_load(before.common, common, anchors, motion, deeper, change, noise, tuning) and not held
     gain = low_pass(noise[0], tuning.force_smoothing)
     follow_forces(elements, room.surface, has_force, gain, after.elements)
+    follow_held_forces(elements, room.surface.pressing, common[HELD_FRAMES], after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, gain, after.elements)
     look_at_forces(elements, places, compared, held, noise, tuning, evidence, after)
     count_by_motion(motion, noise[0], gain, tuning, common, evidence.log_odds)

@@ -174,6 +174,12 @@ def test_pivoting_beyond_half_a_turn_is_followed() -> None:
     assert patch.pose[-1, 2] - patch.pose[0, 2] == pytest.approx(4.0, abs=0.05)
 
 
+def test_under_noise_a_slow_pivot_under_a_load_that_stays_is_followed() -> None:
+    """The markers stand still, and the load does: only where the contact bears it changes."""
+    (patch,) = patches_of(grasp(ramp_and_go(np.deg2rad(60.0), turns=True, go=20.0), FRICTION, Setting(**NOISE)))
+    assert np.rad2deg(patch.pose[-1, 2] - patch.pose[0, 2]) == pytest.approx(60.0, abs=3.0)
+
+
 def test_two_bodies_are_two_patches() -> None:
     one = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, -6e-3)), FRICTION, Setting(half_axes=(2e-3, 4e-3)))
     two = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, 5e-3)), 0.4, Setting(half_axes=(3e-3, 4e-3)))
