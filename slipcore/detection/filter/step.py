@@ -26,6 +26,7 @@ from slipcore.detection.filter.state import (
     EXPECTED,
     FORCE_FRAMES,
     HELD_FRAMES,
+    HELD_POSE,
     LASTING,
     ONSET,
     POSE,
@@ -103,6 +104,8 @@ def step_elements(
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)
     move_anchors(anchors, stored_pose(before.common, POSE), pose, spread, held, tuning, motion, common)
+    if held:  # by its jitter places and pose would walk off together
+        pose = stored_pose(common, HELD_POSE)
     compared = has_force and last.force.size > 0 and len(places) > 0
     change = change if compared else change[:0]
     force_change(places, last.force, frame.force, change)

@@ -97,17 +97,13 @@ def test_a_hold_after_a_scene_moves_no_probability(scene: Callable[..., GraspLog
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("rate", "every", "most"), [(30.0, 1, 0.01), (120.0, 6, 0.15), (1000.0, 6, 0.15)])
+@pytest.mark.parametrize(("rate", "every"), [(30.0, 1), (120.0, 6), (1000.0, 6)])
 @pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
-def test_with_forces_little_changes_in_a_hold_of_any_scene(
-    marker_noise: float, rate: float, every: int, most: float
-) -> None:
-    """Nothing at 30 frames a second; at more, single scenes do (docs/detector.md)."""
+def test_with_forces_little_changes_in_a_hold_of_any_scene(marker_noise: float, rate: float, every: int) -> None:
     frames = round(20.0 * rate)
     logs = [held(simulated(case), frames, rate, marker_noise, "forces") for case in tuning()[::every]]
     found = np.array([drift(detect_slip(log), frames, round(rate)) for log in logs])
-    assert found.mean() <= 0.03
-    assert found.max() <= most
+    assert found.max() <= 0.01
 
 
 @pytest.mark.long
