@@ -115,12 +115,15 @@ def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[P
     variance = 1.0 / spread
     turned = given[2] if given.size else yaw
     room = 0.25 * turned**4 + _STRETCH_VARIANCE
-    stretch = 1.0 + (math.hypot(sine, cosine) / spread - 1.0) * room / (room + variance)
+    stretched = room / (room + variance)
+    stretch = 1.0 + (math.hypot(sine, cosine) / spread - 1.0) * stretched
     if given.size:
         room = turned**6 / 9.0 + _YAW_VARIANCE
+        share = room / (room + variance)
         difference = math.atan2(math.sin(yaw - turned), math.cos(yaw - turned))
-        pose = pose_at(given[0], given[1], turned + difference * room / (room + variance), stretch)
-        return pose, PoseVariance(0.0, 0.0, mx, my)
+        pose = pose_at(given[0], given[1], turned + difference * share, stretch)
+        # A stretch moves what lies at a distance as far as a yaw does.
+        return pose, PoseVariance(0.0, (share * share + stretched * stretched) * variance, mx, my)
     c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
     return pose_at(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), PoseVariance(
         1.0 / total, variance, mx, my

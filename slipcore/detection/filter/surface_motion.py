@@ -55,7 +55,7 @@ def step_pose(
             known, left = without_noise(now, step, pose, spread, noise, tuning, common)
         pose, spread = find_pose(anchors, before, known, variance, tuning)
         if len(anchors.x) >= 2:
-            spread = left
+            spread = PoseVariance(left.place, left.yaw + spread.yaw, left.x, left.y)
     store_pose(common, POSE, pose)
     return pose, spread
 

@@ -106,14 +106,21 @@ def test_with_forces_little_changes_in_a_hold_of_any_scene(marker_noise: float, 
     assert found.max() <= 0.01
 
 
+@pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
+def test_a_hold_of_an_object_that_was_turned_by_a_known_pose_moves_no_probability(marker_noise: float) -> None:
+    """The fit corrects the yaw of a given pose, and jitters, the more the further it was turned."""
+    cup = next(case for case in tuning() if case.name == "cup")
+    assert drift(detect_slip(held(simulated(cup), 600, 30.0, marker_noise, "motion")), 600, 30) <= 0.01
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(("inputs", "marker_noise"), [("displacement", 1e-5), ("motion", 1e-6), ("motion", 1e-5)])
 def test_without_forces_or_with_the_pose_few_scenes_change_in_a_hold(inputs: str, marker_noise: float) -> None:
-    """Cups and a bonded gel do, by up to .35 (docs/detector.md): no promise for each scene."""
+    """Single scenes do, by up to .19 (docs/detector.md): no promise for each scene."""
     logs = [held(simulated(case), 600, 30.0, marker_noise, inputs) for case in tuning()]
     found = np.array([drift(detect_slip(log), 600, 30) for log in logs])
-    assert found.mean() <= 0.025
-    assert (found > 0.01).sum() <= 5
+    assert found.mean() <= 0.01
+    assert (found > 0.01).sum() <= 2
 
 
 def test_interpolated_frames_change_nothing() -> None:
