@@ -97,6 +97,22 @@ def start_module(command: tuple[str, ...], environment: dict[str, str], log: Pat
     return process
 
 
+class Command:
+    """A command ``python -m ...`` as of ``subprocess.Popen``, by a process that has the imports behind it."""
+
+    def __init__(self, command: list[str], env: dict[str, str], stdout: Any, **_: object) -> None:
+        assert command[:2] == [sys.executable, "-m"]
+        self._process = start_module(tuple(command[2:]), env, Path(stdout.name))
+        self.terminate = self._process.terminate
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self, timeout: float) -> None:
+        self._process.join(timeout)
+        assert self._process.exitcode is not None
+
+
 def _run_module(command: tuple[str, ...], environment: dict[str, str], log: Path) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     resource_tracker._resource_tracker.__init__()  # its own one tells of what a killed process leaves in its own log

@@ -15,6 +15,7 @@ from service.demo import inputs, run, server, tables
 from service.demo.inputs import FRICTION
 from service.report.page import Table
 from stiction_client import NoFeasibleForce, required_normal_force
+from tests import forking
 from tests.service.report.test_material import MODEL
 
 ROOT = Path(__file__).parents[2]
@@ -117,6 +118,7 @@ def test_demo_takes_the_real_recordings_all_the_way(
     else:
         monkeypatch.setattr(inputs, "FRICTION", {"cardboard": 0.45})
         monkeypatch.setattr(inputs, "NORMAL_FORCES", (4.0, 13.0))
+        monkeypatch.setattr(subprocess, "Popen", forking.Command)
         with pytest.raises(SystemExit, match="0"):
             main(["demo", "--output", str(tmp_path / "out"), "--recordings", str(RECORDINGS)])
         printed = capsys.readouterr().out

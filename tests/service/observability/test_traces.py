@@ -38,22 +38,6 @@ class Collector(BaseHTTPRequestHandler):
         pass
 
 
-class Forked:
-    """A command ``python -m ...`` as of ``subprocess.Popen``, by a process that has the imports behind it."""
-
-    def __init__(self, command: list[str], env: dict[str, str], stdout: Any, **_: object) -> None:
-        assert command[:2] == [sys.executable, "-m"]
-        self._process = forking.start_module(tuple(command[2:]), env, Path(stdout.name))
-        self.terminate = self._process.terminate
-
-    def poll(self) -> int | None:
-        return self._process.exitcode
-
-    def wait(self, timeout: float) -> None:
-        self._process.join(timeout)
-        assert self._process.exitcode is not None
-
-
 @pytest.fixture
 def spans(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
     """What a collector on loopback was sent; the environment names it."""
@@ -85,7 +69,7 @@ def test_an_upload_is_one_trace_from_its_request_to_its_model(
 ) -> None:
     monkeypatch.setenv("STICTION_DATABASE_URL", new_url(tmp_path))
     headers = {"traceparent": CALLER}
-    monkeypatch.setattr(subprocess, "Popen", Forked)
+    monkeypatch.setattr(subprocess, "Popen", forking.Command)
     with running_server(tmp_path) as url, httpx.Client(base_url=url, headers=headers, timeout=60.0) as client:
         client.post("/v1/materials", json={"name": "paper"}).raise_for_status()
         job = upload(client, content, material="paper").json()["job"]["id"]
