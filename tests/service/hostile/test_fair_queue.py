@@ -37,6 +37,9 @@ TIMES = 5.0
 
 UPLOADS = 5
 
+TURNS = 3
+"""Of an upload alone and one beside the attack, where server and attackers are in this process."""
+
 JOB_SECONDS = 60.0
 """s that a short job is waited for: a hundred times what it takes."""
 
@@ -84,7 +87,7 @@ def by_turns(
 ) -> tuple[Times, Times]:
     """The medians of uploads alone and of those beside the attack: what else the machine does is in both."""
     quiet, beside = [], []
-    for _ in range(UPLOADS):
+    for _ in range(TURNS):
         quiet.append(timed(client, honest()))
         with attack():
             beside.append(timed(client, honest()))
@@ -165,8 +168,8 @@ def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
     monkeypatch.setattr(executors, "ProcessExecutor", ThreadExecutor)
     monkeypatch.setattr(worker, "_stores", lambda _: (database, BlobStore(tmp_path)))
     monkeypatch.setattr(ThreadExecutor, "attack_ended", threading.Event())
-    monkeypatch.setattr(accept, "LONG_FRAMES", 1000)
-    honest, long = numbered(content), numbered(small_and_many(ramp, 2000))
+    monkeypatch.setattr(accept, "LONG_FRAMES", 300)
+    honest, long = numbered(content), numbered(small_and_many(ramp, 600))
     own, attackers = make("upload"), make("upload")
     worker.warm_up()  # the kernels may have to be compiled
     with serving(Settings(data_folder=tmp_path, database_url=database.url, access="keys")) as client:

@@ -254,7 +254,7 @@ def test_noise_alone_is_no_reason_to_seek_the_contact_again(pressed: Pressed, mo
         return better_support(*arguments)
 
     monkeypatch.setattr("slipcore.forces.tracking.tracker.better_support", counted)
-    reconstruct(pressed([0] * 4, noise=3e-6, axes=2, crop=MIDDLE), GEL, noise=3e-6)
+    reconstruct(pressed([1] * 4, noise=3e-6, axes=2, crop=INSIDE), GEL, noise=3e-6)
     assert len(sought) == 1
 
 
