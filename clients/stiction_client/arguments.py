@@ -27,6 +27,15 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     return numbers if numbers.ndim else float(numbers)
 
 
+def number_of_items(limit: object) -> float:
+    """How many items a ``limit`` allows, any number where it is None; raises ``InvalidArgument`` for another value."""
+    if limit is None:
+        return math.inf
+    if not isinstance(limit, int | np.integer) or isinstance(limit, bool) or limit < 1:
+        raise InvalidArgument("limit", _shown(limit), "a whole number from 1, or None for all")
+    return int(limit)
+
+
 def for_json(name: str, value: object) -> Any:
     """``value`` of plain numbers, text, lists and objects, numpy's among them; raises ``InvalidArgument`` naming what
     JSON does not have.

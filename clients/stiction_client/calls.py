@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stiction_client import container, json_values, problems
-from stiction_client.arguments import for_json
+from stiction_client.arguments import for_json, number_of_items
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
     AnswerTooLarge,
@@ -106,7 +106,7 @@ def grasp_log(log_id: str) -> Call[GraspLogReceipt]:
     return found
 
 
-def grasp_logs(material: str | None, limit: int) -> Call[list[GraspLogReceipt]]:
+def grasp_logs(material: str | None, limit: int | None) -> Call[list[GraspLogReceipt]]:
     """Ask for the newest logs."""
     return (yield from _listed("/v1/grasp-logs", GraspLogReceipt.from_json, limit, material=material))
 
@@ -136,20 +136,21 @@ def materials() -> Call[list[Material]]:
 
 
 def _listed(
-    path: str, read: Callable[[Mapping[str, Any]], T], most: float = math.inf, page: int = PAGE, **asked: str | None
+    path: str, read: Callable[[Mapping[str, Any]], T], limit: int | None = None, page: int = PAGE, **asked: str | None
 ) -> Call[list[T]]:
-    """Ask for a list, a ``page`` after the other, until there are enough; pages that are too large in halves."""
+    """Ask for a list up to a ``limit``, a ``page`` after the other; pages that are too large in halves."""
+    most = number_of_items(limit)
     found: list[T] = []
     cursor: str | None = None
     known = set[str | None]()
     while True:
-        limit = int(min(page, most - len(found)))
+        size = int(min(page, most - len(found)))
         try:
-            answer = yield from get(path, without_none(**asked, limit=limit, cursor=cursor))
+            answer = yield from get(path, without_none(**asked, limit=size, cursor=cursor))
         except AnswerTooLarge:
-            if limit == 1:
+            if size == 1:
                 raise
-            page = limit // 2
+            page = size // 2
             continue
         more, cursor = read_as(lambda record: ([read(item) for item in record["items"]], _next(record)), answer)
         found += more
@@ -291,7 +292,7 @@ def job(job_id: str) -> Call[Job]:
     return _job(job_id, (yield from get(f"/v1/jobs/{segment(job_id)}")))
 
 
-def jobs(status: str | None, limit: int) -> Call[list[Job]]:
+def jobs(status: str | None, limit: int | None) -> Call[list[Job]]:
     """Ask for the newest jobs."""
     return (yield from _listed("/v1/jobs", Job.from_json, limit, status=status))
 
@@ -345,7 +346,7 @@ def calibrations(name: str) -> Call[list[dict[str, Any]]]:
     return read_as(lambda record: [dict(each) for each in record["items"]], (yield from get(path)))
 
 
-def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Call[list[AuditEntry]]:
+def audit(actor: str | None, action: str | None, subject: str | None, limit: int | None) -> Call[list[AuditEntry]]:
     """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
     return (yield from _listed("/v1/audit", AuditEntry.from_json, limit, actor=actor, action=action, subject=subject))
 

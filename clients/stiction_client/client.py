@@ -113,7 +113,7 @@ class FrictionClient:
         """A grasp log by its id, with what was detected."""
         return self._run(calls.grasp_log(id))
 
-    def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
+    def grasp_logs(self, material: str | None = None, limit: int | None = 100) -> list[GraspLogReceipt]:
         """The newest logs, newest first: of one ``material``, or all."""
         return self._run(calls.grasp_logs(material, limit))
 
@@ -226,7 +226,7 @@ class FrictionClient:
         """A job as it stands."""
         return self._run(calls.job(id))
 
-    def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
+    def jobs(self, status: str | None = None, limit: int | None = 100) -> list[Job]:
         """The newest jobs, newest first: of one ``status``, such as "failed", or all."""
         return self._run(calls.jobs(status, limit))
 
@@ -277,7 +277,7 @@ class FrictionClient:
         return self._run(calls.calibrations(name))
 
     def audit(
-        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
+        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int | None = 100
     ) -> list[AuditEntry]:
         """The newest entries of the audit trail: who changed what, when, and from where. Needs a key of scope admin."""
         return self._run(calls.audit(actor, action, subject, limit))
@@ -360,7 +360,7 @@ class AsyncFrictionClient:
         """As ``FrictionClient.grasp_log``."""
         return await self._run(calls.grasp_log(id))
 
-    async def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
+    async def grasp_logs(self, material: str | None = None, limit: int | None = 100) -> list[GraspLogReceipt]:
         """As ``FrictionClient.grasp_logs``."""
         return await self._run(calls.grasp_logs(material, limit))
 
@@ -455,7 +455,7 @@ class AsyncFrictionClient:
         """As ``FrictionClient.job``."""
         return await self._run(calls.job(id))
 
-    async def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
+    async def jobs(self, status: str | None = None, limit: int | None = 100) -> list[Job]:
         """As ``FrictionClient.jobs``."""
         return await self._run(calls.jobs(status, limit))
 
@@ -501,7 +501,7 @@ class AsyncFrictionClient:
         return await self._run(calls.calibrations(name))
 
     async def audit(
-        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
+        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int | None = 100
     ) -> list[AuditEntry]:
         """As ``FrictionClient.audit``."""
         return await self._run(calls.audit(actor, action, subject, limit))

@@ -288,6 +288,24 @@ def test_jobs_are_listed_and_cancelled(ask: Ask, service: Service, answers: Simp
     ]
 
 
+@pytest.mark.parametrize("call", ["jobs", "grasp_logs", "audit"])
+def test_a_list_without_a_limit_is_asked_for_to_its_end(ask: Ask, service: Service, call: str) -> None:
+    server = service({"items": [], "next_cursor": None})
+    assert ask(server, call, limit=None) == []
+    assert "limit=1000" in str(server.requests[0].url)  # a page
+
+
+@pytest.mark.parametrize("limit", [0, -1, 2.5, True, "5", math.nan])
+@pytest.mark.parametrize("call", ["jobs", "grasp_logs", "audit"])
+def test_a_limit_that_is_no_number_of_items_is_refused_unasked(
+    ask: Ask, service: Service, call: str, limit: object
+) -> None:
+    server = service()
+    with pytest.raises(InvalidArgument, match="limit"):
+        ask(server, call, limit=limit)
+    assert not server.requests
+
+
 def test_the_key_is_sent_as_a_bearer_token(ask: Ask, service: Service) -> None:
     server = service({"items": []})
     ask(server, "materials", key="secret")
