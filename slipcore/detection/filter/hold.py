@@ -4,7 +4,7 @@ import math
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.pose import Anchors, Pose, PoseVariance, place_of_object, pose_at
-from slipcore.detection.filter.state import HELD_FORCE, HELD_FRAMES, HELD_LOAD, HELD_POSE, LASTING, STILL
+from slipcore.detection.filter.state import HELD_FRAMES, HELD_LOAD, HELD_POSE, HELD_PRESSING, STILL
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays, Surface
 from slipcore.frames import BoolArray, FloatArray
@@ -51,11 +51,11 @@ def keeps_contact(
 ) -> bool:
     """Whether elements touch as they did, but for noise: all was held in the last frame and the load has not changed.
 
-    By noise of forces, and by noise of markers that lasts, elements at the rim come and go, and each would begin at the
-    place that the jitter of the fitted pose gives it: a random walk of the pose, which ends the hold. ``noise``:
-    variance of a marker coordinate m², and deviation of an element's force N. A contact that is given is that.
+    By noise elements at the rim come and go, and each would begin at the place that the jitter of the fitted pose gives
+    it: a random walk of the pose, which ends the hold. ``noise``: variance of a marker coordinate m², and deviation of
+    an element's force N. A contact that is given is that.
     """
-    if frame.contact.size or common[STILL] <= tuning.hold_time or not (has_force or common[LASTING] > 0.0):
+    if frame.contact.size or common[STILL] <= tuning.hold_time:
         return False
     load, variance = load_of(frame, has_force, noise[0], noise[1], tuning)
     return not changed(load, variance, tuning, common)
@@ -63,27 +63,28 @@ def keeps_contact(
 
 @compiled
 def hold_contact(elements: FloatArray, before: BoolArray, surface: Surface, most: float, contact: BoolArray) -> None:
-    """Let elements touch as ``before`` [n, m] whose normal force lies within ``most``, N, of its mean in this hold.
+    """Let elements touch as ``before`` [n, m] whose normal force N, or without forces depth m, lies within ``most`` of
+    its mean in this hold.
 
     Any other has changed: a body may roll, pivot or slide under a load that does not.
     """
     n, m = before.shape
     for i in range(n):
         for j in range(m):
-            if abs(surface.pressing[i, j] - elements[HELD_FORCE, i, j]) <= most:
+            if abs(surface.pressing[i, j] - elements[HELD_PRESSING, i, j]) <= most:
                 contact[i, j] = before[i, j]
             surface.stays[i, j] = contact[i, j] and before[i, j]
 
 
 @compiled
-def follow_held_forces(elements: FloatArray, pressing: FloatArray, frames: float, after: FloatArray) -> None:
-    """Each element's mean normal force [n, m] over the ``frames`` since all is held, the last one of them this."""
+def follow_held_pressing(elements: FloatArray, pressing: FloatArray, frames: float, after: FloatArray) -> None:
+    """Each element's mean normal force N, or depth m, [n, m] over the ``frames`` since all is held, with this one."""
     share = 1.0 / max(frames, 1.0)
     n, m = pressing.shape
     for i in range(n):
         for j in range(m):
-            mean = elements[HELD_FORCE, i, j]
-            after[HELD_FORCE, i, j] = mean + share * (pressing[i, j] - mean)
+            mean = elements[HELD_PRESSING, i, j]
+            after[HELD_PRESSING, i, j] = mean + share * (pressing[i, j] - mean)
 
 
 @compiled

@@ -15,7 +15,7 @@ from slipcore.detection.filter.force_ratio import (
     weigh_forces,
 )
 from slipcore.detection.filter.heading import follow_headings
-from slipcore.detection.filter.hold import follow_held_forces, hold_contact, keeps_contact, step_hold
+from slipcore.detection.filter.hold import follow_held_pressing, hold_contact, keeps_contact, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pooling import find_offsets, pooled_offset
 from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, PoseVariance, object_motion, place_on_object
@@ -70,8 +70,8 @@ def step_filter(
         after.common[DOUBTED_FRAMES] += 0.0 if has_force else 1.0
     noise = noise_of_frame(room.surface, tuning)
     if keeps_contact(frame, noise, has_force, tuning, before.common):
-        spread = noise[1] * math.sqrt(1.0 + 1.0 / before.common[HELD_FRAMES])
-        most = tuning.hold_deviations * spread if has_force else math.inf
+        spread = noise[1] if frame.force.size else math.sqrt(noise[0])  # of what presses: force, or else depth
+        most = tuning.hold_deviations * spread * math.sqrt(1.0 + 1.0 / before.common[HELD_FRAMES])
         hold_contact(before.elements, before.contact, room.surface, most, after.contact)
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last says nothing
@@ -113,7 +113,7 @@ def step_elements(
     restick = restick_under_load(before.common, common, anchors, motion, deeper, change, noise, tuning) and not held
     gain = low_pass(noise[0], tuning.force_smoothing)
     follow_forces(elements, room.surface, has_force, gain, after.elements)
-    follow_held_forces(elements, room.surface.pressing, common[HELD_FRAMES], after.elements)
+    follow_held_pressing(elements, room.surface.pressing, common[HELD_FRAMES], after.elements)
     follow_headings(elements, places, motion, pose, frame.force, tuning.heading_length, gain, after.elements)
     look_at_forces(elements, places, compared, held, noise, tuning, evidence, after)
     count_by_motion(motion, noise[0], gain, tuning, common, evidence.log_odds)

@@ -12,11 +12,10 @@ from slipcore.detection.filter.pose import AnchorMotion, Anchors, PoseVariance, 
 from slipcore.detection.filter.state import (
     COMMON,
     FRICTION,
-    HELD_FORCE,
     HELD_FRAMES,
     HELD_LOAD,
     HELD_POSE,
-    LASTING,
+    HELD_PRESSING,
     LOADING,
     ROWS,
     STILL,
@@ -96,26 +95,24 @@ def test_without_anchors_nothing_is_remembered_and_without_forces_depth_counts()
 
 
 @pytest.mark.parametrize(
-    ("still", "load", "lasting", "has_force", "given", "keeps"),
+    ("still", "load", "has_force", "given", "keeps"),
     [
-        (0.3, 1.0, 5e-6, False, False, True),
-        (0.25, 1.0, 5e-6, False, False, False),
-        (0.3, 1.00002, 5e-6, False, False, False),
-        (0.3, 1.0, 0.0, False, False, False),
-        (0.3, 1.0, 0.0, True, False, True),
-        (0.25, 1.0, 0.0, True, False, False),
-        (0.3, 2.0, 0.0, True, False, False),
-        (0.3, 1.0, 5e-6, False, True, False),
-        (0.3, 1.0, 5e-6, True, True, False),
+        (0.3, 1.0, False, False, True),
+        (0.25, 1.0, False, False, False),
+        (0.3, 1.00002, False, False, False),
+        (0.3, 1.0, True, False, True),
+        (0.25, 1.0, True, False, False),
+        (0.3, 2.0, True, False, False),
+        (0.3, 1.0, False, True, False),
+        (0.3, 1.0, True, True, False),
     ],
 )
-def test_elements_touch_as_they_did_while_all_is_held_by_shape_if_noise_lasts(
-    still: float, load: float, lasting: float, has_force: bool, given: bool, keeps: bool
+def test_elements_touch_as_they_did_while_all_is_held(
+    still: float, load: float, has_force: bool, given: bool, keeps: bool
 ) -> None:
-    """Of 1 m of depth with a noise of 1 µm, in the mean of four frames."""
+    """Of 1 m of depth with a noise of 1 µm, or 1 N with 1 mN, in the mean of four frames."""
     common, field = np.zeros(COMMON), np.zeros((1, 1, 3))
     common[STILL], common[HELD_FRAMES], common[HELD_LOAD + 2], field[0, 0, 2] = still, 4.0, 1.0, load
-    common[LASTING] = lasting
     contact = np.ones((1, 1), bool) if given else NO_MASK
     frame = FrameArrays(0.0, field, field, NO_POSE, field, contact)
     assert unwrap(hold.keeps_contact)(frame, (1e-12, 1e-3), has_force, TUNING, common) == keeps
@@ -124,7 +121,7 @@ def test_elements_touch_as_they_did_while_all_is_held_by_shape_if_noise_lasts(
 def test_of_a_held_contact_only_elements_whose_force_has_changed_beyond_noise_come_or_go() -> None:
     """Of each pair one has, by 3 mN where 2 are noise."""
     elements, before = np.zeros((ROWS, 1, 6)), np.array([[True, True, False, False, True, False]])
-    elements[HELD_FORCE] = 0.05
+    elements[HELD_PRESSING] = 0.05
     found = np.array([[False, False, True, True, True, False]])
     stays = found & before
     pressing = 0.05 + np.array([[-0.001, -0.003, 0.001, 0.003, 0.1, -0.1]])
@@ -137,10 +134,10 @@ def test_of_a_held_contact_only_elements_whose_force_has_changed_beyond_noise_co
 def test_the_held_force_is_the_mean_of_all_frames_since_something_happened() -> None:
     elements, seen = np.full((ROWS, 1, 1), 9.0), [1.0, 2.0, 6.0]
     for frames, force in enumerate(seen, start=1):
-        unwrap(hold.follow_held_forces)(elements, np.array([[force]]), float(frames), elements)
-    assert elements[HELD_FORCE, 0, 0] == pytest.approx(3.0)
-    unwrap(hold.follow_held_forces)(elements, np.array([[5.0]]), 0.0, elements)  # nothing is held
-    assert elements[HELD_FORCE, 0, 0] == pytest.approx(5.0)
+        unwrap(hold.follow_held_pressing)(elements, np.array([[force]]), float(frames), elements)
+    assert elements[HELD_PRESSING, 0, 0] == pytest.approx(3.0)
+    unwrap(hold.follow_held_pressing)(elements, np.array([[5.0]]), 0.0, elements)  # nothing is held
+    assert elements[HELD_PRESSING, 0, 0] == pytest.approx(5.0)
 
 
 def resticks(
