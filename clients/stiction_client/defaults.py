@@ -51,6 +51,10 @@ NOISE_FRAMES = 60.0
 REST_FRAMES = 20.0
 """-, 5 and more: frames over which a load at rest is averaged: a fifth of one frame's noise is left."""
 
-TAKEN_AWAY = 0.9
-"""-, 0.5 to 1: of the load over force that a contact bore, below which it does not slide, but has less load: what
-slides bears more of its force than what held under more force."""
+TAKEN_AWAY = 5.0
+"""-, 3 to 20: standard deviations of its noise that a load lacks beyond twice what a slide would cost it: then it was
+taken away."""
+
+BORNE = 0.8
+"""-, 0.5 to 1: of the largest load over force that a contact bore: what its friction is no less than, with the noise
+of both, and under twice the force where friction falls with its cube root (Hertz)."""

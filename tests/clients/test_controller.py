@@ -25,7 +25,7 @@ from stiction_client import (
 from stiction_client.controller import controller, gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import LoadEstimate, size_of
-from stiction_client.defaults import NORMAL_DEVIATIONS
+from stiction_client.defaults import BORNE, NORMAL_DEVIATIONS
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -104,13 +104,24 @@ def test_a_known_object_that_tells_no_samples_is_held_with_the_planner_s_force(s
 @pytest.mark.parametrize("moving", [1.0, 0.1])
 def test_what_rests_and_is_told_to_slip_does_not_stop_the_force_from_falling(moving: float) -> None:
     """It bears what the contact bears; of a ring that slips, most moves."""
-    state, normal = GraspController.init(SETTINGS), 0.5
+    state, normal = GraspController.init(SETTINGS), 5.0
     for frame in range(1, 200):
         few = SlipSamples(np.array([1.0 / normal]), np.array([0.05]), moving)
         state, command = GraspController.step(state, Observation(frame * FRAME, normal, 1.0, 0.0, 0.8, few))
         normal = command.normal_force
     assert normal > 4.5 if moving == 1.0 else normal < 1.5
     assert (state.learned.sampled == ()) == (moving < 1.0)
+
+
+def test_a_load_that_comes_back_is_gripped_for_the_friction_that_bore_one_before() -> None:
+    """And not as if nothing were known of it; what slips meanwhile would show."""
+    plant = PointContact(ramp((1.5, 0.5, 0.3), (1.0, 3.0, 0.15)), sampled_below=0.0)
+    episode = run(plant, GraspController.init(SETTINGS))
+    borne = 1.5 / min(force for force, time in zip(episode.normal, episode.time, strict=True) if 1.0 < time < 3.0)
+    assert borne > 1.5 * SETTINGS.unknown_friction
+    assert plant.slipped < 1e-5
+    fast = 1.25  # by how much the lead of 2.5 N that come so fast is more
+    assert max(episode.normal) < 1.15 * fast * 2.5 / (BORNE * borne) < fast * 2.5 / SETTINGS.unknown_friction
 
 
 def test_what_was_learnt_is_renewed_by_later_samples() -> None:

@@ -80,11 +80,13 @@ def test_a_load_is_steady_since_the_first_frame_from_which_on_it_changed_little(
     assert load.step(seen(0.55, 1.5), 0.05, SETTINGS).steady == math.inf
 
 
-@pytest.mark.parametrize(("rate", "steady"), [(1.299, 7.0), (1.301, math.inf)])
-def test_what_changes_within_the_lead_by_its_share_is_steady(rate: float, steady: float) -> None:
+@pytest.mark.parametrize(("rate", "steady"), [(1.79, 7.0), (1.81, math.inf)])
+def test_what_changes_within_the_lead_by_its_share_beyond_noise_is_not_steady(rate: float, steady: float) -> None:
     unfiltered = replace(SETTINGS, rate_time=0.0, trend_time=10.0, trend_floor=1.0)
-    before = LoadEstimate(1.0 - 0.01 * rate)
-    assert before.step(seen(7.0, 1.0), 0.01, unfiltered).steady == steady
+    before = LoadEstimate(1.0 - 0.04 * rate, noise=math.sqrt((60.0 * 0.02**2 - 0.5 * (0.04 * rate) ** 2) / 59.0))
+    found = before.step(seen(7.0, 1.0), 0.04, unfiltered)
+    assert found.noise == pytest.approx(0.02, rel=1e-2)
+    assert found.steady == steady
 
 
 def test_no_load_is_not_steady() -> None:

@@ -7,6 +7,7 @@ import pytest
 from stiction_client import ControlSettings, Observation
 from stiction_client.contacts import Contact
 from stiction_client.controller.friction import utilisation
+from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.stick_ratio import StickRatioEstimate
 
 SETTINGS = ControlSettings(contact=Contact.flat(1e-4), least_force=0.5, most_force=30.0)
@@ -14,7 +15,9 @@ NOTHING = StickRatioEstimate()
 
 
 def step(known: StickRatioEstimate, ratio: float, size: float = 1.0, normal: float = 4.0) -> StickRatioEstimate:
-    return known.step(Observation(3.0, normal, size, stick_ratio=ratio), size, SETTINGS)
+    """After a frame under a load that is at rest."""
+    load = LoadEstimate(size, steady=1.0, noise=0.02)
+    return known.step(Observation(3.0, normal, size, stick_ratio=ratio), load, SETTINGS)
 
 
 def test_friction_is_the_load_over_what_the_sticking_part_leaves() -> None:
@@ -41,7 +44,7 @@ def test_a_contact_that_sticks_as_a_whole_shows_none_either() -> None:
 
 def test_without_a_ratio_the_time_of_the_last_one_stands_and_no_slip_is_counted() -> None:
     known = step(NOTHING, 0.0)
-    lost = known.step(Observation(9.0, 4.0, 1.0), 1.0, SETTINGS)
+    lost = known.step(Observation(9.0, 4.0, 1.0), LoadEstimate(1.0), SETTINGS)
     assert (lost.time, lost.friction, lost.slipping) == (3.0, known.friction, 0)
     assert math.isnan(lost.stick_ratio)
 
@@ -61,3 +64,36 @@ def test_nothing_is_required_of_what_bears_nothing_or_was_never_felt() -> None:
     assert step(NOTHING, 0.25).required(0.0, 0.5) == 0.0
     assert StickRatioEstimate(0.0, 0.5, 0.0).required(1.0, 0.5) == math.inf
     assert StickRatioEstimate(0.0, 0.5, 0.0).required(0.0, 0.5) == 0.0
+
+
+def test_a_contact_that_is_pressed_harder_under_its_load_shows_no_slip() -> None:
+    """All of it sticks then, whatever a detector goes on seeing; and shows slip again as it bears as much as before."""
+    known = step(NOTHING, 0.25)
+    pressed = step(known, 0.25, normal=4.4)
+    assert (pressed.shows, pressed.friction) == (False, known.friction)
+    assert step(pressed, 0.25, normal=4.2).shows
+    assert step(pressed, 0.25, normal=3.8).friction > known.friction
+
+
+@pytest.mark.parametrize(
+    "load", [LoadEstimate(1.0, noise=0.02), LoadEstimate(0.5, steady=1.0, noise=0.02)], ids=["grows", "fell"]
+)
+def test_under_another_load_slip_shows_however_much_it_is_pressed(load: LoadEstimate) -> None:
+    seen = Observation(4.0, 8.0, load.size, stick_ratio=0.25)
+    assert step(NOTHING, 0.25).step(seen, load, SETTINGS).shows
+
+
+def test_friction_is_no_less_than_what_was_borne_but_for_noise() -> None:
+    known = step(step(NOTHING, 1.0, normal=2.0), 1.0, normal=8.0)
+    assert known.bore == pytest.approx((1.0 - 0.02) / 2.0)
+    assert known.least(SETTINGS) == pytest.approx(0.8 * 0.49)
+    assert step(NOTHING, 1.0, normal=8.0).least(SETTINGS) == SETTINGS.unknown_friction
+
+
+def test_what_was_borne_is_forgotten_without_a_load_and_where_it_slips() -> None:
+    known = step(NOTHING, 1.0, normal=2.0)
+    assert step(known, 1.0, size=0.05).bore == 0.0
+    assert step(known, 1.0, normal=0.0).bore == 0.0
+    for _ in range(SETTINGS.reflex_frames + 1):
+        known = step(known, 0.0, normal=8.0)
+    assert known.bore == pytest.approx(1.0 / 8.0)

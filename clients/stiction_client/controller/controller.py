@@ -96,7 +96,7 @@ def _taken_over(state: ControllerState, observation: Observation) -> ControllerS
 def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
     """What the frame says of load and friction."""
     load = state.load.step(observation, elapsed, state.settings)
-    sticking = state.sticking.step(observation, load.size, state.settings)
+    sticking = state.sticking.step(observation, load, state.settings)
     sampled = _sampled(observation, sticking, state.settings)
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, sticking, load.size, state.settings)
     learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
@@ -107,7 +107,7 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
         learned = learned.with_frame(sampled, count, agrees or (covers and _has_model(state)), state.settings)
     if recognition is not None:
         ratio = sampled if counts and (agrees or covers) else math.nan
-        recognition = recognition.step(observation.time, _loaded(load, state.settings), ratio, count, state.settings)
+        recognition = recognition.step(observation.time, load.loads(state.settings), ratio, count, state.settings)
     against = _contradicts(state, sticking, observation.normal, load.size)
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
@@ -121,7 +121,7 @@ def _sampled(observation: Observation, sticking: StickRatioEstimate, settings: C
     """The contact's friction by the elements that slip; NaN without any."""
     if (
         observation.slip_samples is None
-        or not sticking.stick_ratio < settings.told_stick_ratio
+        or not (sticking.shows and sticking.stick_ratio < settings.told_stick_ratio)
         or observation.normal == 0.0
     ):
         return math.nan
@@ -190,7 +190,7 @@ def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
-    if state.relaxation.slides(state.load, settings):
+    if state.relaxation.slides(state.load, state.sticking.bore, settings):
         return _enter(_slid(state), "hold")
     if state.known is not None and _refuted(state, state.known, observation.normal):
         return _enter(_forgotten(state), "alarm")
@@ -275,19 +275,14 @@ def _blind(state: ControllerState) -> bool:
     """Whether neither a model nor the stick ratio shows how hard to hold a load."""
     return (
         state.known is None
-        and _loaded(state.load, state.settings)
+        and state.load.loads(state.settings)
         and state.time - state.sticking.time > state.settings.dropout_time
     )
 
 
-def _loaded(load: LoadEstimate, settings: ControlSettings) -> bool:
-    """Whether the load needs more than the least force, were friction low."""
-    return load.size > settings.unknown_friction * settings.least_force
-
-
 def _settled(state: ControllerState) -> bool:
     """Whether a load that needs more than the least force has been steady for a while."""
-    return _loaded(state.load, state.settings) and state.time - state.load.steady >= state.settings.settle_time
+    return state.load.loads(state.settings) and state.time - state.load.steady >= state.settings.settle_time
 
 
 def _slips(state: ControllerState) -> bool:
@@ -319,10 +314,11 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     among = state.recognition
     waits = among is not None and among.waits(state.time, settings) and state.mode == "feel"
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
-    demands.append(_Demand(state.sticking.required(load, target), "stick ratio"))
+    least = state.sticking.least(settings)
+    demands.append(_Demand(state.sticking.required(load, target, least), "stick ratio"))
     lowest = state.learned.lowest(settings)
     if state.mode == "learn" and lowest > 0.0:
-        friction = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
+        friction = max(lowest, least)  # what sticks, taken for slip, would ask for ever more
         demands.append(_Demand(load / friction, "samples of slip"))
     if state.known is not None:
         most = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
@@ -331,8 +327,8 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
         demands.append(_Demand(load / among.borne(observation.normal, settings), "to be recognised"))
         demands = _held_still(state, demands)
     elif state.mode != "learn":
-        why = "no stick ratio" if _blind(state) else "friction unknown"
-        demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
+        why, friction = ("no stick ratio", settings.unknown_friction) if _blind(state) else ("friction unknown", least)
+        demands += [_Demand(load / friction, why), _Demand(state.normal_force, why)]
     return demands
 
 
@@ -354,7 +350,7 @@ def _shown(state: ControllerState) -> float:
 
     What sticks, taken for slip, would ask for ever more.
     """
-    return max(state.learned.low(state.settings), state.settings.unknown_friction)
+    return max(state.learned.low(state.settings), state.sticking.least(state.settings))
 
 
 def _limited(state: ControllerState, force: float, elapsed: float) -> float:

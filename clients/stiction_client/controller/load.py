@@ -1,7 +1,7 @@
 """The load on a contact, its rate, and what it will be when the gripper has followed."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from stiction_client.controller.records import Observation
 from stiction_client.controller.settings import ControlSettings
@@ -30,9 +30,14 @@ class LoadEstimate:
             return LoadEstimate(size, steady=observation.time, noise=self.noise)
         rate = _followed(self.rate, size - self.size, elapsed, settings.rate_time)
         trend = _followed(self.trend, size - self.size, elapsed, settings.trend_time)
-        moving = LoadEstimate(size, rate, trend, noise=_scatter(self.noise, size - self.size - trend * elapsed))
-        changes = abs(moving.lead(settings) - size) > settings.steady_share * size or size == 0.0
-        return replace(moving, steady=math.inf if changes else min(self.steady, observation.time))
+        noise = _scatter(self.noise, size - self.size - trend * elapsed)
+        surely = rate - noise / (elapsed + settings.rate_time)
+        changes = settings.lead_time * _beyond(surely, trend, settings) > settings.steady_share * size or size == 0.0
+        return LoadEstimate(size, rate, trend, math.inf if changes else min(self.steady, observation.time), noise)
+
+    def loads(self, settings: ControlSettings) -> bool:
+        """Whether it needs more than the least force, were friction low."""
+        return self.size > settings.unknown_friction * settings.least_force
 
     def lead(self, settings: ControlSettings) -> float:
         """Size in ``lead_time``, N, if it grows; else as it is."""
@@ -40,12 +45,16 @@ class LoadEstimate:
 
     def after(self, time: float, settings: ControlSettings) -> float:
         """Size in ``time`` s, N, if it goes on growing as it does; else as it is."""
-        rate = max(self.rate - settings.rate_floor, self.trend - settings.trend_floor, 0.0)
-        return self.size + rate * time
+        return self.size + _beyond(self.rate, self.trend, settings) * time
 
     def growth(self, settings: ControlSettings) -> float:
         """Factor by which the load will have grown in ``lead_time``."""
         return self.lead(settings) / self.size if self.size > 0.0 else 1.0
+
+
+def _beyond(rate: float, trend: float, settings: ControlSettings) -> float:
+    """How fast a load grows, N/s, beyond what noise makes of its rate and trend."""
+    return max(rate - settings.rate_floor, trend - settings.trend_floor, 0.0)
 
 
 def _followed(rate: float, change: float, elapsed: float, time: float) -> float:

@@ -1,18 +1,21 @@
 """Whether a contact slides while its grip is relaxed under a load at rest: then it bears ever less."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.settings import ControlSettings
-from stiction_client.defaults import REST_FRAMES, TAKEN_AWAY
+from stiction_client.defaults import BORNE, REST_FRAMES, TAKEN_AWAY
 
 
 @dataclass(frozen=True, slots=True)
 class Relaxation:
-    """The ``load`` N that a grip bore while that was at rest (``since``, s), for so many ``frames``; and, as the grip
-    is relaxed, what it ``bore`` of its force when that began, what it ``bears``, and how much load it ``lost`` N, a sum
-    over frames (Page's cumulative sum, 1954).
+    """The ``load`` N that a grip bore while that was at rest (``since``, s), the mean of so many ``frames``.
+
+    Of the latest frames of a grip that is being relaxed whose loads look like those of a contact that slides: the force
+    ``start`` N before them, 0 without any; how many there are (``sliding``), the sums of what they ``bore`` and of what
+    they were ``pressed`` with, N; and, of the load that each lacks, the sums of what is ``expected`` by a slide,
+    squared, and of that times what is ``lost``, N².
 
     A contact that holds bears its load under any force; one that slides bears less, the less it is pressed. A detector
     that sees the sensor alone finds nothing: no marker moves while all of a contact slides.
@@ -21,31 +24,47 @@ class Relaxation:
     since: float = math.inf
     load: float = 0.0
     frames: int = 0
+    start: float = 0.0
+    sliding: int = 0
     bore: float = 0.0
-    bears: float = 0.0
+    pressed: float = 0.0
+    expected: float = 0.0
     lost: float = 0.0
 
     def step(self, load: LoadEstimate, normal: float, relaxed: bool) -> "Relaxation":
-        """The same after one more frame, under ``normal`` N; what is lost within the load's noise is no loss."""
+        """The same after one more frame, under ``normal`` N.
+
+        Frames count while a slide explains their loads better than a contact that holds (Page's test, 1954); else they
+        add to the mean of what it holds.
+        """
         if not math.isfinite(load.steady):
             return Relaxation()
         if load.steady != self.since:
             return Relaxation(load.steady, load.size, 1)
-        if not relaxed or normal == 0.0:
-            return self._averaged(load, 0.0)
-        bore, bears = self.bore or self.load / normal, load.size / normal
-        if bears < TAKEN_AWAY * bore:
-            return Relaxation()
-        return replace(self, bore=bore, bears=bears)._averaged(load, self.lost + self.load - load.size - load.noise)
+        known = relaxed and self.start > 0.0 and self.frames >= 0.5 * REST_FRAMES
+        expected, lost = self.load * (1.0 - normal / self.start) if known else 0.0, self.load - load.size
+        if lost > 2.0 * max(expected, 0.0) + TAKEN_AWAY * load.noise:
+            return Relaxation(load.steady, load.size, 1)
+        squares, lost = self.expected + expected**2, self.lost + expected * lost
+        sliding, bore, pressed = self.sliding + 1, self.bore + load.size, self.pressed + normal
+        if expected >= 0.0 and lost > 0.5 * squares:
+            return Relaxation(self.since, self.load, self.frames, self.start, sliding, bore, pressed, squares, lost)
+        frames = self.frames + sliding
+        share = min(sliding / min(frames, REST_FRAMES), 1.0)
+        held = self.load + (bore / sliding - self.load) * share
+        return Relaxation(self.since, held, frames, normal if relaxed else 0.0)
 
-    def _averaged(self, load: LoadEstimate, lost: float) -> "Relaxation":
-        """With what was lost; while that is more than noise, the load from before stands."""
-        if lost > load.noise:
-            return replace(self, lost=lost)
-        mean = self.load + (load.size - self.load) / min(self.frames + 1.0, REST_FRAMES)
-        return replace(self, load=mean, frames=self.frames + 1, lost=max(lost, 0.0))
+    @property
+    def bears(self) -> float:
+        """Load over force of the frames in which the contact slides, its friction."""
+        return self.bore / self.pressed
 
-    def slides(self, load: LoadEstimate, settings: ControlSettings) -> bool:
-        """Whether more was lost than noise explains, and than a load at rest may change by, but not by less load."""
-        explained = max(settings.slide_deviations * load.noise, settings.steady_share * self.load)
-        return self.lost > explained and self.bears >= self.bore
+    def slides(self, load: LoadEstimate, bore: float, settings: ControlSettings) -> bool:
+        """Whether a slide explains the loads so much better that noise does not, and no load that is taken away.
+
+        What slides bears its friction of its force, which is no less than what it ``bore`` of it before.
+        """
+        evidence, noise = self.lost - 0.5 * self.expected, max(load.noise, 0.1 * settings.steady_share * self.load)
+        if evidence <= 0.5 * (settings.slide_deviations * noise) ** 2 or self.lost > 2.0 * self.expected:
+            return False
+        return self.bears >= BORNE * bore

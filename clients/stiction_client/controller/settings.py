@@ -105,8 +105,10 @@ class ControlSettings:
     ] = WITHOUT_EFFECT
     slide_deviations: Annotated[
         float,
-        Gain(1.0, 100.0, "-", "of the load's noise, in a sum: noise alone loses so much in none of 1500 grips"),
-    ] = 8.0
+        Gain(
+            1.0, 100.0, "-", "a slide explains the load by so much better than noise, which does in none of 900 grips"
+        ),
+    ] = 5.0
     dropout_time: Annotated[float, Gain(1e-3, 10.0, "s", "three frames at 30 frames/s")] = 0.1
     unknown_friction: Annotated[
         float, Gain(0.01, 10.0, "-", "of what robots lift, little is more slippery: the usual fixed value")
