@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from slipcore.calibration.defaults import ESTIMATE
 
@@ -61,7 +61,7 @@ def joined(name: str, unit: str, found: Sequence[PressResult]) -> Estimate:
     if not known:
         return unknown(name, unit, next(each for each in found if isinstance(each, str)))
     value, error, freedom = _random_effects(np.array(known))
-    half = float(stats.t.ppf(0.5 + 0.5 * ESTIMATE.confidence, freedom)) * error
+    half = float(stdtrit(freedom, 0.5 + 0.5 * ESTIMATE.confidence)) * error
     return Estimate(name, unit, value, value - half, value + half)
 
 

@@ -7,7 +7,7 @@ D(k) = 2 σ_w² + 2 σ_c² (1 − φᵏ) for white noise beside a first-order au
 import math
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate, unknown
@@ -38,7 +38,7 @@ def marker_noise(presses: list[PressLog]) -> tuple[Estimate, Estimate]:
     blocks = min(ESTIMATE.noise_blocks, count)
     parts = np.array([_fit(np.delete(squares, np.s_[k::blocks], axis=1).mean(axis=1)) for k in range(blocks)])
     error = np.sqrt((blocks - 1) / blocks * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
-    half = float(norm.ppf(0.5 + 0.5 * ESTIMATE.confidence)) * error
+    half = float(ndtri(0.5 + 0.5 * ESTIMATE.confidence)) * error
     return _bounded(names[0], whole[0], half[0], math.inf), _bounded(names[1], whole[1], half[1], 1.0)
 
 
