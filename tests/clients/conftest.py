@@ -17,6 +17,7 @@ from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client import AsyncFrictionClient, Cost, Domain, FrictionClient, FrictionModel, calls, exchange
+from tests import forking
 
 MODEL = {
     "material": "paper",
@@ -236,8 +237,15 @@ def grasp() -> GraspLog:
 
 @pytest.fixture(scope="session")
 def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Address of a real service on a free loopback port, in a thread (its workers are processes)."""
-    app = create_app(Settings(data_folder=tmp_path_factory.mktemp("served"), poll_seconds=5.0))
+    """Address of a real service on a free loopback port, in a thread (its workers are forked processes)."""
+    forking.begin()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("service.processes.spawned.CONTEXT", forking.Context())
+        yield from _served(Settings(data_folder=tmp_path_factory.mktemp("served"), poll_seconds=5.0))
+
+
+def _served(settings: Settings) -> Iterator[str]:
+    app = create_app(settings)
     server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", ws="none"))
     thread = threading.Thread(target=server.run)
     thread.start()
