@@ -64,8 +64,10 @@ STEP = SHIFT + 2
 BEND = STEP + 2
 """[2] By how much it differed from the one before, m."""
 JITTER = BEND + 2
-"""[2] Fading sums of squares and products of such differences, m² (``surroundings.share_of_jitter``)."""
-HELD_FRAMES = JITTER + 2
+"""[2] Fading sums of squares and products of such differences, m² (``surroundings.add_step``)."""
+SHAKING = JITTER + 2
+"""1 while most of what markers jitter by they have in common, as under a camera that shakes; else 0."""
+HELD_FRAMES = SHAKING + 1
 """Number of frames since pose or load last changed."""
 HELD_POSE = HELD_FRAMES + 1
 """[4] Mean pose over these."""

@@ -33,6 +33,7 @@ from slipcore.detection.filter.state import (
     PROBABILITY,
     REFERENCE,
     RESOLUTION,
+    SHAKING,
     SLIP_VARIANCE,
     SLIP_X,
     SLIP_Y,
@@ -41,7 +42,7 @@ from slipcore.detection.filter.state import (
     STICK_Y,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
-from slipcore.detection.filter.surroundings import shift_of_surroundings
+from slipcore.detection.filter.surroundings import shakes, shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
@@ -100,6 +101,7 @@ def step_elements(
     places = room.places[: find_places(elements, stays, room.places)]
     anchors, motion, deeper, change, evidence, seen, states = rooms_of(room.rows, len(places))
     shift = shift_of_surroundings(last, frame, before.contact, after.contact, room.weight, room.rows, tuning, common)
+    common[SHAKING] = 1.0 if shakes(variance, tuning, common) else 0.0
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)

@@ -16,7 +16,7 @@ from slipcore.detection.filter.pose import (
     pose_at,
 )
 from slipcore.detection.filter.pose_noise import PoseNoise, noise_of_pose, own_variance, without_noise
-from slipcore.detection.filter.state import CORRECTION, FOLLOWING, FORCE_FRAMES, POSE
+from slipcore.detection.filter.state import CORRECTION, FOLLOWING, FORCE_FRAMES, POSE, SHAKING
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
@@ -37,7 +37,9 @@ def step_pose(
 ) -> tuple[Pose, PoseVariance]:
     """Where the surface is now, put into ``common`` too; ``variance`` of a marker coordinate, m²."""
     pose, spread = find_pose(anchors, before, NOT_GIVEN, variance, tuning)
-    if frame.object_pose.size and last.object_pose.size:
+    if common[SHAKING] > 0.0:  # markers show where they are themselves, and no pose does
+        common[CORRECTION:FORCE_FRAMES] = 0.0
+    elif frame.object_pose.size and last.object_pose.size:
         step = frame.object_pose - last.object_pose
         step[2] = math.atan2(math.sin(step[2]), math.cos(step[2]))
         if len(anchors.x) < 2:

@@ -3,7 +3,7 @@
 import math
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.state import BEND, JITTER, SHIFT, STEP
+from slipcore.detection.filter.state import BEND, JITTER, SHAKING, SHIFT, STEP
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import BoolArray, FloatArray
@@ -25,35 +25,50 @@ def shift_of_surroundings(
 
     It moves as they do in the mean while ``surroundings_jitter`` of their motion is jitter. Those count that lie
     ``surroundings_reach`` contact radii or more from what touches, without outliers: the mean of the same markers adds
-    up to no random walk. Fewer than ``surroundings_least`` say nothing, nor do any where the object's pose is given:
-    their motion has the gel's own in it, too. ``distance`` [n, m], ``rows``: room.
+    up to no random walk. Fewer than ``surroundings_least`` say nothing. As their motion has the gel's own in it, too,
+    they say nothing beside a pose that is given unless the camera is ``SHAKING``. ``distance`` [n, m], ``rows``: room.
     """
-    if not frame.object_pose.size:
-        touching = distance_from(was, contact, distance)
-        reach = max(1.0, tuning.surroundings_reach * math.sqrt(touching / math.pi))
-        count = find_steps(last.displacement, frame.displacement, distance, reach, rows)
-        if count >= tuning.surroundings_least:
-            u, v = usual_step(rows[:, :count], tuning.surroundings_outlier)
-            if share_of_jitter(u, v, tuning, common) >= tuning.surroundings_jitter:
-                common[SHIFT] += u
-                common[SHIFT + 1] += v
+    touching = distance_from(was, contact, distance)
+    reach = max(1.0, tuning.surroundings_reach * math.sqrt(touching / math.pi))
+    count = find_steps(last.displacement, frame.displacement, distance, reach, rows)
+    if count >= tuning.surroundings_least:
+        u, v = usual_step(rows[:, :count], tuning.surroundings_outlier)
+        add_step(u, v, tuning, common)
+        heard = common[SHAKING] > 0.0 or not frame.object_pose.size
+        if heard and share_of_jitter(tuning, common) >= tuning.surroundings_jitter:
+            common[SHIFT] += u
+            common[SHIFT + 1] += v
     return common[SHIFT], common[SHIFT + 1]
 
 
 @compiled
-def share_of_jitter(u: float, v: float, tuning: Tuning, common: FloatArray) -> float:
-    """What share of the steps (this one is u, v m) white noise of place has, by their changes b: −3/2 Σb·b′/Σb².
-
-    White noise of variance σ² gives Σb² = 6σ² and, of each with the one before it, Σb·b′ = −4σ²; an even motion gives
-    neither. Both sums fade over ``surroundings_memory`` frames.
+def shakes(variance: float, tuning: Tuning, common: FloatArray) -> bool:
+    """Whether markers around the contact jitter together by ``surroundings_jitter`` of the ``variance`` of one, m², or
+    more: white noise of variance σ² along x and y adds 12σ² to Σb² each frame.
     """
+    together = common[JITTER] / (12.0 * tuning.surroundings_memory)
+    jitters = share_of_jitter(tuning, common) >= tuning.surroundings_jitter
+    return bool(jitters and together >= tuning.surroundings_jitter * variance)
+
+
+@compiled
+def add_step(u: float, v: float, tuning: Tuning, common: FloatArray) -> None:
+    """Add a step u, v m to the sums over its changes b, Σb² and Σb·b′, which fade over ``surroundings_memory``."""
     kept = 1.0 - 1.0 / tuning.surroundings_memory
     bend_u, bend_v = u - common[STEP], v - common[STEP + 1]
     common[JITTER] = kept * common[JITTER] + bend_u**2 + bend_v**2
     common[JITTER + 1] = kept * common[JITTER + 1] + bend_u * common[BEND] + bend_v * common[BEND + 1]
     common[STEP], common[STEP + 1], common[BEND], common[BEND + 1] = u, v, bend_u, bend_v
-    share = -1.5 * common[JITTER + 1] / (common[JITTER] + tuning.displacement_floor**2)
-    return float(min(max(share, 0.0), 1.0))
+
+
+@compiled
+def share_of_jitter(tuning: Tuning, common: FloatArray) -> float:
+    """What share of the steps white noise of place has, by their changes b and b′ in a row: −3/2 Σb·b′/Σb².
+
+    White noise of variance σ² gives b² = 6σ² and b·b′ = −4σ² a direction in the mean; an even motion gives neither.
+    """
+    total = common[JITTER] + tuning.displacement_floor**2
+    return float(min(max(-1.5 * common[JITTER + 1] / total, 0.0), 1.0)) if total > 0.0 else 0.0
 
 
 @compiled

@@ -8,7 +8,7 @@ import pytest
 from slipcore import FilterOptions
 from slipcore.detection.filter import pooling, surroundings
 from slipcore.detection.filter.pose import Anchors, Pose
-from slipcore.detection.filter.state import BEND, COMMON, JITTER, SHIFT, STEP
+from slipcore.detection.filter.state import BEND, COMMON, JITTER, SHAKING, SHIFT, STEP
 from slipcore.detection.filter.tuning import Tuning, settings_of
 from slipcore.detection.shared.records import NO_FIELD, NO_POSE, FrameArrays
 from tests.slipcore.plain_kernels import as_plain_python
@@ -52,21 +52,47 @@ def test_where_all_are_off_in_one_direction_the_middle_is_the_step() -> None:
 
 def test_jitter_is_told_by_changes_of_the_step_that_turn_back() -> None:
     common = np.zeros(COMMON)
-    assert surroundings.share_of_jitter(2.0, 1.0, TUNING, common) == 0.0
+    surroundings.add_step(2.0, 1.0, TUNING, common)
+    assert surroundings.share_of_jitter(TUNING, common) == 0.0
     np.testing.assert_array_equal(common[STEP : STEP + 2], [2.0, 1.0])
     np.testing.assert_array_equal(common[BEND : BEND + 2], [2.0, 1.0])
     np.testing.assert_array_equal(common[JITTER : JITTER + 2], [5.0, 0.0])
-    share = surroundings.share_of_jitter(1.0, 0.0, TUNING, common)
+    surroundings.add_step(1.0, 0.0, TUNING, common)
     np.testing.assert_array_equal(common[BEND : BEND + 2], [-1.0, -1.0])
     np.testing.assert_array_equal(common[JITTER : JITTER + 2], [0.75 * 5.0 + 2.0, -3.0])
-    assert share == pytest.approx(1.5 * 3.0 / 5.75, rel=1e-9)
+    assert surroundings.share_of_jitter(TUNING, common) == pytest.approx(1.5 * 3.0 / 5.75, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("squares", "products", "variance", "expected"),
+    [
+        (48e-12, -30e-12, 1e-12, True),
+        (48e-12, -30e-12, 2e-12, True),  # half of it
+        (48e-12, -30e-12, 2.1e-12, False),
+        (48e-12, -15e-12, 1e-12, False),  # mostly an even motion
+        (0.0, 0.0, 1e-12, False),
+    ],
+)
+def test_a_camera_shakes_where_most_of_the_noise_is_a_jitter_in_common(
+    squares: float, products: float, variance: float, expected: bool
+) -> None:
+    """Squares of 48 µm² over four frames are those of 1 µm along x and along y."""
+    common = np.zeros(COMMON)
+    common[JITTER : JITTER + 2] = squares, products
+    tuning = TUNING._replace(displacement_floor=0.0)
+    assert unwrap(surroundings.shakes)(variance, tuning, common) == expected
 
 
 def shifted(
-    steps: list[tuple[float, float]], tuning: Tuning = TUNING, pose: np.ndarray = NO_POSE, width: int = 5
+    steps: list[tuple[float, float]],
+    tuning: Tuning = TUNING,
+    pose: np.ndarray = NO_POSE,
+    width: int = 5,
+    shaking: float = 0.0,
 ) -> np.ndarray:
     """Where the camera is said to be after steps of all markers but the middle one, which touches."""
     common, contact = np.zeros(COMMON), np.zeros((width, width), bool)
+    common[SHAKING] = shaking
     contact[width // 2, width // 2] = True
     place, found = np.zeros((width, width, 3)), (0.0, 0.0)
     shift = unwrap(surroundings.shift_of_surroundings)
@@ -91,12 +117,13 @@ def test_a_camera_is_where_markers_that_jitter_took_it() -> None:
     assert not shifted([(1e-5, 0.0)] * 8).any()
 
 
-def test_too_few_markers_or_a_pose_that_is_given_say_nothing() -> None:
+def test_too_few_markers_say_nothing_nor_do_they_beside_a_given_pose_unless_the_camera_shakes() -> None:
     near = TUNING._replace(surroundings_reach=1.0)
     assert shifted(TO_AND_FRO, near, width=3).any()  # eight around one
     assert not shifted(TO_AND_FRO, near._replace(surroundings_least=9), width=3).any()
     assert not shifted(TO_AND_FRO, width=3).any()  # twice the radius of one element leaves four
     assert not shifted(TO_AND_FRO, pose=np.zeros(3)).any()
+    assert shifted(TO_AND_FRO, pose=np.zeros(3), shaking=1.0).any()
     assert not shifted(TO_AND_FRO, tuning=TUNING._replace(surroundings_reach=9.0)).any()
 
 
