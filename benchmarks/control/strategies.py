@@ -13,6 +13,7 @@ from slipcore.contact import reduced
 from slipcore.contact.reduced import World
 from stiction_client import ControllerState, ControlSettings, Cost, Domain, FrictionModel, GraspController, Observation
 from stiction_client.controller.load import LoadEstimate
+from stiction_client.controller.stick_ratio import StickRatioEstimate
 
 MOST = 30.0
 """N of the gripper."""
@@ -30,6 +31,8 @@ OFTEN, LIGHT = 1e-2, 0.5
 FIXED = 0.2
 """Friction of the fixed strategy."""
 
+REGULATED = 0.7
+"""Stick ratio that is held by it alone."""
 REFLEX_STEP, REFLEX_STICK_RATIO = 0.5, 0.5
 """N by which the slip reflex presses harder in each frame in which no more than that of the contact sticks."""
 
@@ -67,6 +70,27 @@ class Fixed:
         self.load = self.load.step(seen, elapsed, self.settings)
         slowest = self.force * (1.0 - self.settings.fall_rate * elapsed)
         self.force = min(max(self.load.lead(self.settings) / self.friction, slowest, START), MOST)
+        return self.force
+
+
+@dataclass
+class ByStickRatio:
+    """So that ``REGULATED`` of the contact sticks under the load to come, by what the stick ratio shows of friction."""
+
+    settings: ControlSettings
+    load: LoadEstimate = field(default_factory=LoadEstimate)
+    sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
+    time: float = 0.0
+    force: float = START
+
+    def __call__(self, seen: Observation) -> float:
+        """Its command."""
+        elapsed, self.time = seen.time - self.time, seen.time
+        self.load = self.load.step(seen, elapsed, self.settings)
+        self.sticking = self.sticking.step(seen, self.load, self.settings)
+        asked = self.sticking.required(self.load.lead(self.settings), REGULATED)
+        slowest = self.force * (1.0 - self.settings.relax_rate * elapsed)
+        self.force = min(max(asked, slowest, START), MOST)
         return self.force
 
 
@@ -135,8 +159,7 @@ def without_model(task: Task, world: World, finger: int) -> Strategy:  # noqa: A
 
 def by_stick_ratio(task: Task, world: World, finger: int) -> Strategy:  # noqa: ARG001
     """The stick ratio held at 0.7, nothing learnt."""
-    alone = settings_of(world, feel_stick_ratio=0.7, learn_stick_ratio=0.7, learn_frames=1000, unknown_friction=10.0)
-    return Controlled(GraspController.init(alone))
+    return ByStickRatio(settings_of(world))
 
 
 def fixed(task: Task, world: World, finger: int) -> Strategy:  # noqa: ARG001
