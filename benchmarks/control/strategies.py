@@ -32,7 +32,7 @@ FIXED = 0.2
 """Friction of the fixed strategy."""
 
 REGULATED = 0.7
-"""Stick ratio that is held by it alone."""
+"""Stick ratio that is regulated where nothing else is."""
 REFLEX_STEP, REFLEX_STICK_RATIO = 0.5, 0.5
 """N by which the slip reflex presses harder in each frame in which no more than that of the contact sticks."""
 
@@ -55,11 +55,11 @@ class Controlled:
 
 
 @dataclass
-class Fixed:
-    """As hard as one ``friction`` asks for under the load to come, with the controller's lead and rates."""
+class UnderLoad:
+    """As hard as the load to come asks for, with the controller's lead; it falls by ``fall_rate``, 1/s, at most."""
 
     settings: ControlSettings
-    friction: float = FIXED
+    fall_rate: float
     load: LoadEstimate = field(default_factory=LoadEstimate)
     time: float = 0.0
     force: float = START
@@ -68,30 +68,38 @@ class Fixed:
         """Its command."""
         elapsed, self.time = seen.time - self.time, seen.time
         self.load = self.load.step(seen, elapsed, self.settings)
-        slowest = self.force * (1.0 - self.settings.fall_rate * elapsed)
-        self.force = min(max(self.load.lead(self.settings) / self.friction, slowest, START), MOST)
+        slowest = self.force * (1.0 - self.fall_rate * elapsed)
+        self.force = min(max(self.asked(seen), slowest, START), MOST)
         return self.force
 
+    def asked(self, seen: Observation) -> float:
+        """Force, N, that the load asks for after a frame."""
+        raise NotImplementedError
 
-@dataclass
-class ByStickRatio:
-    """So that ``REGULATED`` of the contact sticks under the load to come, by what the stick ratio shows of friction."""
 
-    settings: ControlSettings
-    load: LoadEstimate = field(default_factory=LoadEstimate)
-    sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
-    time: float = 0.0
-    force: float = START
+class Fixed(UnderLoad):
+    """By one ``friction``, with the controller's rates."""
 
-    def __call__(self, seen: Observation) -> float:
-        """Its command."""
-        elapsed, self.time = seen.time - self.time, seen.time
-        self.load = self.load.step(seen, elapsed, self.settings)
+    def __init__(self, settings: ControlSettings, friction: float = FIXED) -> None:
+        super().__init__(settings, settings.fall_rate)
+        self.friction = friction
+
+    def asked(self, seen: Observation) -> float:  # noqa: ARG002 - the load is all that it heeds
+        """By that friction."""
+        return self.load.lead(self.settings) / self.friction
+
+
+class ByStickRatio(UnderLoad):
+    """So that ``REGULATED`` of the contact sticks, by what the stick ratio shows of friction; nothing is learnt."""
+
+    def __init__(self, settings: ControlSettings) -> None:
+        super().__init__(settings, settings.relax_rate)
+        self.sticking = StickRatioEstimate()
+
+    def asked(self, seen: Observation) -> float:
+        """By the friction that was shown last; nothing before any."""
         self.sticking = self.sticking.step(seen, self.load, self.settings)
-        asked = self.sticking.required(self.load.lead(self.settings), REGULATED)
-        slowest = self.force * (1.0 - self.settings.relax_rate * elapsed)
-        self.force = min(max(asked, slowest, START), MOST)
-        return self.force
+        return self.sticking.required(self.load.lead(self.settings), REGULATED)
 
 
 @dataclass
@@ -158,7 +166,7 @@ def without_model(task: Task, world: World, finger: int) -> Strategy:  # noqa: A
 
 
 def by_stick_ratio(task: Task, world: World, finger: int) -> Strategy:  # noqa: ARG001
-    """The stick ratio held at 0.7, nothing learnt."""
+    """The stick ratio alone."""
     return ByStickRatio(settings_of(world))
 
 

@@ -288,11 +288,16 @@ def test_jobs_are_listed_and_cancelled(ask: Ask, service: Service, answers: Simp
     ]
 
 
-@pytest.mark.parametrize("call", ["jobs", "grasp_logs", "audit"])
-def test_a_list_without_a_limit_is_asked_for_to_its_end(ask: Ask, service: Service, call: str) -> None:
-    server = service({"items": [], "next_cursor": None})
-    assert ask(server, call, limit=None) == []
-    assert "limit=1000" in str(server.requests[0].url)  # a page
+@pytest.mark.parametrize(("call", "item"), [("jobs", "job"), ("grasp_logs", "grasp_log")])
+def test_a_list_without_a_limit_is_asked_for_to_its_end(
+    ask: Ask, service: Service, answers: SimpleNamespace, call: str, item: str
+) -> None:
+    """Also where that is beyond a page, and beyond the hundred that are asked for by default."""
+    entry = getattr(answers, item)
+    server = service({"items": [entry] * 1000, "next": "more"}, {"items": [entry] * 200, "next": None})
+    assert len(ask(server, call, limit=None)) == 1200
+    asked = [dict(request.url.params) for request in server.requests]
+    assert asked == [{"limit": "1000"}, {"limit": "1000", "cursor": "more"}]
 
 
 @pytest.mark.parametrize("limit", [0, -1, 2.5, True, "5", math.nan])
