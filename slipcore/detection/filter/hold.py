@@ -78,7 +78,7 @@ def hold_contact(elements: FloatArray, before: BoolArray, surface: Surface, most
 
 @compiled
 def follow_held_pressing(elements: FloatArray, pressing: FloatArray, frames: float, after: FloatArray) -> None:
-    """Each element's mean normal force N, or depth m, [n, m] over the ``frames`` since all is held, with this one."""
+    """Each element's mean normal force N, or depth m, [n, m] over the ``frames`` since a change, with this one."""
     share = 1.0 / max(frames, 1.0)
     n, m = pressing.shape
     for i in range(n):

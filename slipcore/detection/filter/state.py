@@ -28,7 +28,7 @@ ROWS = 21
     SPRING_X,  # what it has taken up of the object's motion since then, m (``slip_limit``)
     SPRING_Y,
     EXPECTED,  # log-odds of slip that follow from that
-    HELD_PRESSING,  # mean of its normal force N, or without forces of its depth m, since all is held
+    HELD_PRESSING,  # mean of its normal force N, or without forces of its depth m, over ``HELD_FRAMES``
 ) = range(ROWS)
 
 POSE = 0

@@ -38,6 +38,8 @@ def shift_of_surroundings(
         if heard and share_of_jitter(tuning, common) >= tuning.surroundings_jitter:
             common[SHIFT] += u
             common[SHIFT + 1] += v
+    else:  # what was seen of a shake before may be over
+        common[JITTER : JITTER + 2] = 0.0
     return common[SHIFT], common[SHIFT + 1]
 
 

@@ -83,6 +83,15 @@ def test_a_camera_shakes_where_most_of_the_noise_is_a_jitter_in_common(
     assert unwrap(surroundings.shakes)(variance, tuning, common) == expected
 
 
+def test_a_shake_is_forgotten_where_too_few_markers_are_left_to_show_it() -> None:
+    common, contact = np.zeros(COMMON), np.ones((5, 5), bool)
+    common[JITTER : JITTER + 2] = 48e-12, -30e-12
+    frame = FrameArrays(0.0, np.zeros((5, 5, 3)), NO_FIELD, np.zeros(3), NO_FIELD, contact)
+    room = np.empty((5, 5)), np.empty((3, 25))
+    unwrap(surroundings.shift_of_surroundings)(frame, frame, contact, contact, *room, TUNING, common)
+    assert not unwrap(surroundings.shakes)(1e-12, TUNING, common)
+
+
 def shifted(
     steps: list[tuple[float, float]],
     tuning: Tuning = TUNING,
