@@ -55,6 +55,13 @@ TAKEN_AWAY = 5.0
 """-, 3 to 20: standard deviations of its noise that a load lacks beyond twice what a slide would cost it: then it was
 taken away."""
 
+KNOWN_FRAMES = 10
+"""-, 3 to 60: frames at rest from which on the mean of a load is known well enough to see what it lacks."""
+
+LEAST_NOISE = 0.005
+"""-, 0 to 0.05: of a load: what its noise counts as at least where a slide is looked for, a tenth of ``steady_share``:
+how little a load changes that is next to free of noise would else be a slide."""
+
 BORNE = 0.8
 """-, 0.5 to 1: of the largest load over force that a contact bore: what its friction is no less than, with the noise
 of both, and under twice the force where friction falls with its cube root (Hertz)."""

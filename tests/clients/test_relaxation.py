@@ -9,6 +9,7 @@ import pytest
 from stiction_client import Contact, ControlSettings
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.relaxation import Relaxation
+from stiction_client.defaults import LEAST_NOISE
 
 SETTINGS = ControlSettings(contact=Contact(6e-5), least_force=0.5, most_force=40.0, slide_deviations=5.0)
 NOISE = 0.02
@@ -74,7 +75,7 @@ def test_a_contact_slides_once_noise_does_not_explain_what_is_lost() -> None:
 
 
 def test_what_is_little_of_the_load_is_no_slide_however_little_that_scatters() -> None:
-    evidence = 0.5 * (SETTINGS.slide_deviations * 0.1 * SETTINGS.steady_share) ** 2
+    evidence = 0.5 * (SETTINGS.slide_deviations * LEAST_NOISE) ** 2
     found = replace(HELD, sliding=3, bore=2.7, pressed=6.7, expected=2.0 * evidence, lost=2.0 * evidence)
     assert not found.slides(at_rest(0.9, 1e-6), 0.4, SETTINGS)
     assert replace(found, lost=2.0 * evidence + 1e-9).slides(at_rest(0.9, 1e-6), 0.4, SETTINGS)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.settings import ControlSettings
-from stiction_client.defaults import BORNE, REST_FRAMES, TAKEN_AWAY
+from stiction_client.defaults import BORNE, KNOWN_FRAMES, LEAST_NOISE, REST_FRAMES, TAKEN_AWAY
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Relaxation:
             return Relaxation()
         if load.steady != self.since:
             return Relaxation(load.steady, load.size, 1)
-        known = relaxed and self.start > 0.0 and self.frames >= 0.5 * REST_FRAMES
+        known = relaxed and self.start > 0.0 and self.frames >= KNOWN_FRAMES
         expected, lost = self.load * (1.0 - normal / self.start) if known else 0.0, self.load - load.size
         if lost > 2.0 * max(expected, 0.0) + TAKEN_AWAY * load.noise:
             return Relaxation(load.steady, load.size, 1)
@@ -64,7 +64,7 @@ class Relaxation:
 
         What slides bears its friction of its force, which is no less than what it ``bore`` of it before.
         """
-        evidence, noise = self.lost - 0.5 * self.expected, max(load.noise, 0.1 * settings.steady_share * self.load)
+        evidence, noise = self.lost - 0.5 * self.expected, max(load.noise, LEAST_NOISE * self.load)
         if evidence <= 0.5 * (settings.slide_deviations * noise) ** 2 or self.lost > 2.0 * self.expected:
             return False
         return self.bears >= BORNE * bore
