@@ -40,18 +40,21 @@ class LoadedContact:
         """The same contact, were friction its mean and nothing about it uncertain."""
         return replace(self, quantile=self.quantile.expected())
 
+    def lowest(self, most: Number) -> tuple[Number, Truth]:
+        """The least x that holds, and whether there is one up to ``most``."""
+        return self._lowest(self.quantile.asymptote, most)
+
     def interval(self, most: Number) -> tuple[Number, Number, Truth]:
         """The least x that holds, the greatest up to ``most``, and whether there are such."""
-        loaded = (self.load > 0.0) | (self.moment > 0.0)
         line = self.quantile.asymptote
-        low, found = self._search(select(loaded, self._start(line), 1.0), 1)
+        low, holds = self._lowest(line, most)
         high = end = self._end(line, most)
         bounded = (end > 0.0) & (end < math.inf)
         if anywhere(bounded):
             high = select(bounded, self._search(select(bounded, end, 1.0), -1)[0], end)
         rests = (self.load + self.moment == 0.0) & (self.quantile(0.0)[0] <= 0.0)  # and no force but 0 is sure to hold
-        low, high = select(loaded, low, 0.0), select(rests, 0.0, high)
-        return low, select(high > low, high, low), (found | (low == 0.0)) & (low <= most * (1.0 + ROUNDING))
+        high = select(rests, 0.0, high)
+        return low, select(high > low, high, low), holds
 
     def best(self, most: float) -> float:
         """The x up to ``most`` at which most of the load is held: 0 where none ever is, infinite if it has no end."""
@@ -65,7 +68,14 @@ class LoadedContact:
 
     def multiple(self, x: float) -> float:
         """How many times its load the contact holds at x; without a load, how many newtons."""
-        return float(self.force(x) * self.quantile(self.unit * x)[0] / (self._load(x) or 1.0))
+        return float(self.force(x) * self.quantile(self.unit * x)[0] / (self._load(x)[0] or 1.0))
+
+    def _lowest(self, line: tuple[Number, Number], most: Number) -> tuple[Number, Truth]:
+        """As ``lowest``, with the ``line`` above friction."""
+        loaded = (self.load > 0.0) | (self.moment > 0.0)
+        low, found = self._search(select(loaded, self._start(line), 1.0), 1)
+        low = select(loaded, low, 0.0)
+        return low, (found | (low == 0.0)) & (low <= most * (1.0 + ROUNDING))
 
     def _end(self, line: tuple[Number, Number], most: Number) -> Number:
         """An x up to ``most`` beyond which nothing holds: where the ``line`` above friction meets 0."""
@@ -76,21 +86,18 @@ class LoadedContact:
         end = select(self.unit * end < ENDLESS, end, math.inf)
         return select(end < most, greatest(end, 0.0), most)
 
-    def _load(self, x: Number) -> Number:
-        """L(x), N."""
+    def _load(self, x: Number) -> tuple[Number, Number]:
+        """L(x), N, and −d log L / d log x: what part of it is torque that a larger contact bears more easily."""
         twist = self.moment if self.power == 1 else self.moment / x
-        return (self.load * self.load + twist * twist) ** 0.5
-
-    def _relief(self, x: Number, load: Number) -> Number:
-        """−d log L / d log x where L is ``load``: what part of it is torque that a larger contact bears more easily."""
-        return 0.0 if self.power == 1 else (self.moment / x / (load + (load == 0.0))) ** 2
+        load = (self.load * self.load + twist * twist) ** 0.5
+        return load, 0.0 if self.power == 1 else (twist / (load + (load == 0.0))) ** 2
 
     def surplus(self, x: Number) -> tuple[Number, Number]:
         """q(unit·x) − L(x)/xⁿ, and its slope."""
         friction, slope = self.quantile(self.unit * x)
-        load = self._load(x)
+        load, relief = self._load(x)
         asked = load / x if self.power == 1 else load / x / x / x  # no power of x may underflow
-        return friction - asked, self.unit * slope + (self.power + self._relief(x, load)) * asked / x
+        return friction - asked, self.unit * slope + (self.power + relief) * asked / x
 
     def _search(self, x: Number, direction: int) -> tuple[Number, Truth]:
         """Newton's method from ``x``: the next root in ``direction``, 1 or -1, and whether there is one."""
@@ -125,7 +132,7 @@ class LoadedContact:
     def _growth(self, x: float) -> tuple[float, float]:
         """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""
         f = self.unit * x
-        (friction, slope), relief = self.quantile(f), self._relief(x, self._load(x))
+        (friction, slope), (_, relief) = self.quantile(f), self._load(x)
         curvature = self.quantile.second_derivative(f)
         growth = friction * (self.power + relief) + f * slope
         relieving = -2.0 * relief * (1.0 - relief) / x

@@ -106,6 +106,10 @@ class FrictionQuantile:
             return min(_peak_of_hyperbola(c, *_joined(s, k, g, below * self.low, -below)), self.low)
         return peak
 
+    def mean(self, force: Number) -> Number:
+        """The expected friction [-]."""
+        return self.a + self.c * force
+
     def expected(self) -> "FrictionQuantile":
         """The mean instead: what is known were there no uncertainty and no scatter."""
         return replace(self, s=0.0, k=0.0, g=0.0, below=0.0, above=0.0)

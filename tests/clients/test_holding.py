@@ -59,6 +59,14 @@ def test_arrays_and_floats_hold_alike(power: int) -> None:
     np.testing.assert_allclose(many[0][:3], [low for low, *_ in each][:3], rtol=1e-12)
 
 
+@pytest.mark.parametrize("power", [1, 3])
+def test_the_least_alone_is_that_of_the_interval(power: int) -> None:
+    for load in (0.0, 0.2, 1e6):
+        contact = LoadedContact(UNSURE, load, 0.1 * load, 0.02, power)
+        low, _, holds = contact.interval(1e3)
+        assert contact.lowest(1e3) == (low, holds)
+
+
 def test_what_bears_no_load_holds_from_0_on_or_not_at_all_where_friction_is_not_sure() -> None:
     assert LoadedContact(SURE, 0.0, 0.0, 0.01, 1).interval(7.0)[:2] == (0.0, 7.0)
     doubtful = FrictionQuantile(0.01, 0.0, 0.02, 0.0, 0.0)

@@ -111,10 +111,18 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     against = _contradicts(state, sticking, observation.normal, load.size)
     overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
-    seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
-    relaxation = state.relaxation.step(load, observation.normal, relaxed=state.mode == "learn")
-    seen = replace(seen, overloaded=overloaded, relaxation=relaxation)
-    return replace(seen, contradictions=contradictions, rested=state.rested or _settled(seen))
+    return replace(  # once: of a step's time it takes a tenth
+        state,
+        time=observation.time,
+        load=load,
+        sticking=sticking,
+        learned=learned,
+        recognition=recognition,
+        contradictions=contradictions,
+        overloaded=overloaded,
+        rested=state.rested or load.settled(observation.time, state.settings),
+        relaxation=state.relaxation.step(load, observation.normal, relaxed=state.mode == "learn"),
+    )
 
 
 def _sampled(observation: Observation, sticking: StickRatioEstimate, settings: ControlSettings) -> float:
@@ -215,7 +223,7 @@ def _unlearnt(state: ControllerState) -> bool:
 
 def _relaxes(state: ControllerState, observation: Observation) -> bool:
     """Whether the force may fall until enough slips to be sampled: under a load at rest, where slip can be seen."""
-    return _settled(state) and observation.stick_ratio >= 0.0
+    return state.load.settled(state.time, state.settings) and observation.stick_ratio >= 0.0
 
 
 def _slid(state: ControllerState) -> ControllerState:
@@ -253,12 +261,13 @@ def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> C
     """With what this grasp's samples add; slip, where they had more friction than a model, disproves them."""
     learnt = state.learned.known(state.settings)
     if not known.of_others:
-        return replace(state, known=learnt or known)
+        return state if learnt is None else replace(state, known=learnt)
     if learnt is not None and normal > 0.0 and known.surpassed(state.learned, normal, state.settings):
         return replace(state, known=learnt, material=None, probability=0.0)
     if _disproves(state, known):
         return replace(state, known=known.disproved(), learned=LearnedFriction())
-    return replace(state, known=known.sharpen(state.learned, normal, state.settings))
+    sharpened = known.sharpen(state.learned, normal, state.settings)
+    return state if sharpened is known else replace(state, known=sharpened)
 
 
 def _disproves(state: ControllerState, known: KnownFriction) -> bool:
@@ -278,11 +287,6 @@ def _blind(state: ControllerState) -> bool:
         and state.load.loads(state.settings)
         and state.time - state.sticking.time > state.settings.dropout_time
     )
-
-
-def _settled(state: ControllerState) -> bool:
-    """Whether a load that needs more than the least force has been steady for a while."""
-    return state.load.loads(state.settings) and state.time - state.load.steady >= state.settings.settle_time
 
 
 def _slips(state: ControllerState) -> bool:

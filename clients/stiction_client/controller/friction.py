@@ -1,7 +1,7 @@
 """What a grip controller knows of friction: a model, or what it learnt in this grasp."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist, median
 
 from stiction_client.contacts import Contact
@@ -61,7 +61,7 @@ class KnownFriction:
         power = self.contact.power
         factor = self.sharpened
         loaded = LoadedContact(self.quantile, tangential / factor, self._twist(torque) / factor, self.unit, power)
-        least, _, holds = loaded.interval(loaded.root(most))
+        least, holds = loaded.lowest(loaded.root(most))
         return float(loaded.force(least)) if holds else math.inf
 
     def expected(self, force: float) -> float:
@@ -108,7 +108,7 @@ class KnownFriction:
         Of samples from different times the most are taken: later ones are often of single elements, which a detector
         takes for slipping while they rest.
         """
-        count = sum(learned.counts)
+        count = learned.count
         if not self.of_others or force == 0.0 or count < self.samples:
             return self
         if not learned.agrees(settings.contradiction_frames, settings):
@@ -132,7 +132,7 @@ class KnownFriction:
 
     def _low_and_mean(self, force: float) -> tuple[float, float]:
         element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
-        return float(self.quantile(element)[0]), float(self.quantile.expected()(element)[0])
+        return float(self.quantile(element)[0]), float(self.quantile.mean(element))
 
     def _twist(self, torque: float) -> float:
         return torque / float(self.contact.arm(1.0)) if torque > 0.0 else 0.0
@@ -143,12 +143,27 @@ class LearnedFriction:
     """The contact's friction by the elements that slipped: ``values`` of the latest frames that had any, by how many
     elements (``counts``).
 
-    ``sampled``: of the latest frames that had samples, those among them that the stick ratio contradicts.
+    ``sampled``: of the latest frames that had samples, those among them that the stick ratio contradicts. ``count``:
+    of all elements in these frames; ``mean``: of their friction, NaN without any; ``spread``: of the frames about it,
+    relative, each by the number of its elements.
     """
 
     values: tuple[float, ...] = ()
     counts: tuple[int, ...] = ()
     sampled: tuple[float, ...] = ()
+    count: int = field(init=False, compare=False, default=0)
+    mean: float = field(init=False, compare=False, default=math.nan)
+    spread: float = field(init=False, compare=False, default=math.nan)
+
+    def __post_init__(self) -> None:
+        count = sum(self.counts)
+        if count == 0:
+            return
+        mean = sum(value * each for value, each in zip(self.values, self.counts, strict=True)) / count
+        squares = sum((value - mean) ** 2 * each for value, each in zip(self.values, self.counts, strict=True))
+        spread = math.sqrt(squares / count) / mean if mean > 0.0 else math.inf
+        for name, value in (("count", count), ("mean", mean), ("spread", spread)):
+            object.__setattr__(self, name, value)  # the record is frozen, and asked for them several times a frame
 
     def with_frame(self, friction: float, count: int, agrees: bool, settings: ControlSettings) -> "LearnedFriction":
         """The same after one more frame; of the older ones ``learn_frames`` are kept."""
@@ -158,15 +173,9 @@ class LearnedFriction:
             return LearnedFriction(self.values, self.counts, sampled)
         return LearnedFriction((*self.values, friction)[-frames:], (*self.counts, count)[-frames:], sampled)
 
-    @property
-    def mean(self) -> float:
-        """Of all elements in these frames."""
-        total = sum(value * count for value, count in zip(self.values, self.counts, strict=True))
-        return total / sum(self.counts)
-
     def error(self, settings: ControlSettings) -> float:
         """Of the mean, relative: one standard deviation, of which the bias common to all samples is a part."""
-        return error_of_mean(sum(self.counts), settings)
+        return error_of_mean(self.count, settings)
 
     def low(self, settings: ControlSettings) -> float:
         """The mean less what it may err by; 0 without samples."""
@@ -182,15 +191,9 @@ class LearnedFriction:
             return math.nan
         return median(self.sampled) * (1.0 - NORMAL_DEVIATIONS * settings.learned_error)
 
-    @property
-    def spread(self) -> float:
-        """Of the frames about the mean, relative, each by the number of its elements."""
-        squares = sum((value - self.mean) ** 2 * count for value, count in zip(self.values, self.counts, strict=True))
-        return math.sqrt(squares / sum(self.counts)) / self.mean
-
     def agrees(self, frames: int, settings: ControlSettings) -> bool:
         """Whether there are so many ``frames`` of them, to within ``learn_spread``."""
-        return len(self.values) >= frames and self.mean > 0.0 and self.spread <= settings.learn_spread
+        return len(self.values) >= frames and self.spread <= settings.learn_spread
 
     def known(self, settings: ControlSettings) -> KnownFriction | None:
         """A model of it, once ``learn_frames`` agree to within ``learn_spread``."""

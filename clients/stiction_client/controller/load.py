@@ -39,6 +39,10 @@ class LoadEstimate:
         """Whether it needs more than the least force, were friction low."""
         return self.size > settings.unknown_friction * settings.least_force
 
+    def settled(self, time: float, settings: ControlSettings) -> bool:
+        """Whether a load that needs more than the least force has been steady for a while, at ``time`` s."""
+        return self.loads(settings) and time - self.steady >= settings.settle_time
+
     def lead(self, settings: ControlSettings) -> float:
         """Size in ``lead_time``, N, if it grows; else as it is."""
         return self.after(settings.lead_time, settings)

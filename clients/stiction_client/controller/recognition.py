@@ -105,7 +105,7 @@ class GripRecognition:
 
     def _low_and_mean(self, force: float) -> tuple[FloatArray, FloatArray]:
         element = self.unit * (force if self.power == 1 else force ** (1.0 / 3.0))
-        return np.asarray(self.quantile(element)[0]), np.asarray(self.quantile.a + self.quantile.c * element)
+        return np.asarray(self.quantile(element)[0]), np.asarray(self.quantile.mean(element))
 
 
 def _log_normal(away: FloatArray, variance: FloatArray) -> FloatArray:
