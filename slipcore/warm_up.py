@@ -22,6 +22,7 @@ def warm_up(*methods: str) -> float:
 def warm_up_detectors(*methods: str) -> None:
     """What a first frame waits for: the kernels of these methods, of all if none is named."""
     from slipcore.detection.batch import detect_slip
+    from slipcore.detection.detector import SlipDetector
     from slipcore.detection.methods import METHODS
 
     axis = 1e-3 * np.arange(3.0)
@@ -30,6 +31,8 @@ def warm_up_detectors(*methods: str) -> None:
     log = GraspLog(np.linspace(0.0, 0.3, len(force)), position, np.zeros(force.shape), element_area=1e-6, force=force)
     for method in methods or METHODS:
         detect_slip(log, method, lookahead=1)
+        detector = SlipDetector(position, log.element_area, method)
+        detector.step(0.0, log.displacement[0], force[0], normal=np.broadcast_to([0.0, 0.0, 1.0], position.shape))
 
 
 def warm_up_samples() -> None:

@@ -51,6 +51,7 @@ from slipcore.slip_state import SlipState
 from slipcore.surface.log_normals import normals_of_shape
 from slipcore.surface.strain import Lattice
 from slipcore.surface.turning import SUMS
+from slipcore.surface.unit_normals import are_outward_units
 
 
 class Setup(NamedTuple):
@@ -277,8 +278,8 @@ def _checked(
         float(time),
         _field("displacement", displacement, shape, LIMITS.displacement, "m"),
         None if force is None else _field("force", force, shape, LIMITS.force, "N per element"),
-        None if object_pose is None else check_pose(object_pose),
-        None if normal is None else check_normal(normal, shape),
+        None if object_pose is None else _pose(object_pose),
+        None if normal is None else _normal(normal, shape),
         None if contact is None else check_mask("contact", contact, shape[:2]),
         None if observed is None else check_mask("observed", observed, shape[:2]),
     )
@@ -286,10 +287,39 @@ def _checked(
 
 def _field(name: str, value: ArrayLike, shape: tuple[int, ...], limit: float, unit: str) -> FloatArray:
     """A copy of the field that nobody writes to; what is not plainly right is looked at by ``check_frame``."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
-        copy = value.copy()
+    copy = _plain_copy(value, shape)
+    if copy is not None:
         flat = copy.ravel()
         if ddot(flat, flat) <= limit * limit:  # none is larger, nor infinite or NaN; numpy would warn of these
-            copy.flags.writeable = False
-            return copy
+            return _unwritable(copy)
     return check_frame(name, value, shape, limit, unit)
+
+
+def _normal(value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """The same of normals, by ``check_normal``."""
+    copy = _plain_copy(value, shape)
+    if copy is not None and are_outward_units(copy, LIMITS.normal_length):
+        return _unwritable(copy)
+    return check_normal(value, shape)
+
+
+def _pose(value: ArrayLike) -> FloatArray:
+    """The same of a pose, by ``check_pose``."""
+    copy = _plain_copy(value, (3,))
+    if copy is not None:
+        x, y, yaw = copy.tolist()
+        if abs(x) <= LIMITS.position and abs(y) <= LIMITS.position and abs(yaw) <= LIMITS.yaw:
+            return _unwritable(copy)
+    return check_pose(value)
+
+
+def _plain_copy(value: ArrayLike, shape: tuple[int, ...]) -> FloatArray | None:
+    """A copy of what is an array of this shape and of the type that kernels take, else None."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
+        return value.copy()
+    return None
+
+
+def _unwritable(array: FloatArray) -> FloatArray:
+    array.flags.writeable = False
+    return array

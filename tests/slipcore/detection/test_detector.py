@@ -194,7 +194,9 @@ def test_an_unknown_method_or_option_is_refused_by_name(
         ({"force": np.full((4, 5, 3), np.inf)}, "force is inf"),
         ({"object_pose": np.zeros(2)}, "object_pose is of shape"),
         ({"object_pose": np.array([5.0, 0.0, 0.0])}, "object_pose x, y is 5"),
+        ({"object_pose": np.array([0.0, 0.0, np.nan])}, "object_pose is nan"),
         ({"normal": np.ones((4, 5, 3))}, "normal is of length"),
+        ({"normal": np.full((4, 5, 3), [0.0, 0.0, -1.0])}, "normal is z component -1"),
     ],
 )
 def test_a_bad_frame_is_refused_by_name_and_leaves_the_detector_as_it_was(
@@ -207,6 +209,18 @@ def test_a_bad_frame_is_refused_by_name_and_leaves_the_detector_as_it_was(
         detector.step(**{"time": 0.1, **QUIET, **change})
     assert detector.state is before
     detector.step(0.1, **QUIET)
+
+
+def test_normals_and_poses_may_come_as_lists_and_are_copied() -> None:
+    one, other = SlipDetector(lattice(), 1e-6), SlipDetector(lattice(), 1e-6)
+    normal, pose = np.full((4, 5, 3), [0.0, 0.6, 0.8]), np.array([1e-3, 0.0, 0.1])
+    one.step(0.0, **QUIET, normal=normal, object_pose=pose)
+    other.step(0.0, **QUIET, normal=normal.tolist(), object_pose=pose.tolist())
+    kept = normal.copy(), pose.copy()
+    normal[:], pose[:] = np.nan, np.nan
+    for detector in (one, other):
+        np.testing.assert_array_equal(detector.state.frame.normal, kept[0])
+        np.testing.assert_array_equal(detector.state.frame.object_pose, kept[1])
 
 
 def test_a_lattice_without_strain_and_an_absurd_area_are_refused() -> None:
