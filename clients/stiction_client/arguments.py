@@ -19,7 +19,7 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
         raise InvalidArgument(name, value, _range(low, high, unit))
     array = np.asarray(value)
     if array.dtype.kind not in "iuf":
-        raise InvalidArgument(name, _shown(value), f"numbers: {_range(low, high, unit)}")
+        raise InvalidArgument(name, shown(value), f"numbers: {_range(low, high, unit)}")
     numbers = array.astype(np.float64)
     wrong = ~((low <= numbers) & (numbers <= high))
     if wrong.any():
@@ -27,12 +27,20 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     return numbers if numbers.ndim else float(numbers)
 
 
+def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
+    """One whole number in [low, high]; raises ``InvalidArgument`` for anything else."""
+    number = within(name, value, low, high, unit)
+    if not isinstance(number, float) or not number.is_integer():
+        raise InvalidArgument(name, shown(value), f"a whole number: {_range(low, high, unit)}")
+    return int(number)
+
+
 def number_of_items(limit: object) -> float:
     """How many items a ``limit`` allows, any number where it is None; raises ``InvalidArgument`` for another value."""
     if limit is None:
         return math.inf
     if not isinstance(limit, int | np.integer) or isinstance(limit, bool) or limit < 1:
-        raise InvalidArgument("limit", _shown(limit), "a whole number from 1, or None for all")
+        raise InvalidArgument("limit", shown(limit), "a whole number from 1, or None for all")
     return int(limit)
 
 
@@ -50,12 +58,13 @@ def for_json(name: str, value: object) -> Any:
         raise InvalidArgument(name, value, "a finite number")
     if value is None or isinstance(value, str | int | float):
         return value
-    raise InvalidArgument(name, _shown(value), "numbers, text, and lists and objects of these")
+    raise InvalidArgument(name, shown(value), "numbers, text, and lists and objects of these")
 
 
 def _range(low: float, high: float, unit: str) -> str:
     return f"{low:g} to {high:g} {unit}".strip()
 
 
-def _shown(value: object) -> str:
+def shown(value: object) -> str:
+    """A value as a message shows it."""
     return repr(value)[:60]

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction_client.arguments import within
+from stiction_client.arguments import whole, within
 from stiction_client.elementwise import Number
+from stiction_client.errors import InvalidArgument
 
 AREAS = (1e-12, 1.0)
 """m² that a contact of a gripper may have."""
@@ -51,11 +52,14 @@ class Contact:
 
         Its area is that of the elements under pressure and stays so at any force.
         """
-        p = np.asarray(within("pressure", pressure, 0.0, 1e12, "Pa"), dtype=np.float64)
+        p = np.atleast_1d(within("pressure", pressure, 0.0, 1e12, "Pa"))
+        places = [np.atleast_1d(within(name, place, -1.0, 1.0, "m")) for name, place in (("x", x), ("y", y))]
+        if any(place.shape != p.shape for place in places) or p.ndim != 1:
+            sizes = " and ".join(str(list(each.shape)) for each in (p, *places))
+            raise InvalidArgument("pressure, x and y", f"{sizes} numbers", "three rows of one length")
         element = within("element_area", element_area, *AREAS, "m²")
         force = within("total pressure", float(p.sum()), 1e-300, 1e300, "Pa, above 0")
-        centre = [float(p @ np.asarray(place)) / force for place in (x, y)]
-        radius = np.hypot(np.asarray(x) - centre[0], np.asarray(y) - centre[1])
+        radius = np.hypot(*(place - float(p @ place) / force for place in places))
         pressed = int((p > 0.0).sum())
         return cls(pressed * element, None, float(p @ p) * pressed / force**2, float(p @ radius) / force)
 
@@ -112,5 +116,6 @@ def antipodal(contact: Contact) -> Contacts:
 
 def n_fingers(count: int, contact: Contact, object_radius: Number) -> Contacts:
     """Fingers evenly around an object of ``object_radius`` m, such as a lid; a torque is about the object's axis."""
-    fingers = int(within("count", count, 1, 100, "fingers"))
-    return Contacts(contact, fingers, within("object_radius", object_radius, 1e-6, 1e3, "m"))
+    return Contacts(
+        contact, whole("count", count, 1, 100, "fingers"), within("object_radius", object_radius, 1e-6, 1e3, "m")
+    )

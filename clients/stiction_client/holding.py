@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from stiction_client.defaults import ENDLESS, MOST_STEPS, ROUNDING
-from stiction_client.elementwise import Number, Truth, anywhere, greatest, least, select
+from stiction_client.elementwise import Number, Truth, anywhere, greatest, hypot, least, select
 from stiction_client.quantile import FrictionQuantile
 
 
@@ -66,9 +66,11 @@ class LoadedContact:
             return 0.0
         return end if self._growth(end)[0] > 0.0 else self._turning_point(max(least, 1e-9 * end), end)
 
-    def multiple(self, x: float) -> float:
-        """How many times its load the contact holds at x; without a load, how many newtons."""
-        return float(self.force(x) * self.quantile(self.unit * x)[0] / (self._load(x)[0] or 1.0))
+    def held(self, x: float, load: float) -> float:
+        """To what a ``load`` N that grows in proportion to the contact's may grow at x; without one, ``load`` times so
+        many newtons.
+        """
+        return float(self.force(x) * self.quantile(self.unit * x)[0] * (load / (self._load(x)[0] or 1.0)))
 
     def _lowest(self, line: tuple[Number, Number], most: Number) -> tuple[Number, Truth]:
         """As ``lowest``, with the ``line`` above friction."""
@@ -89,7 +91,7 @@ class LoadedContact:
     def _load(self, x: Number) -> tuple[Number, Number]:
         """L(x), N, and −d log L / d log x: what part of it is torque that a larger contact bears more easily."""
         twist = self.moment if self.power == 1 else self.moment / x
-        load = (self.load * self.load + twist * twist) ** 0.5
+        load = hypot(self.load, twist)
         return load, 0.0 if self.power == 1 else (twist / (load + (load == 0.0))) ** 2
 
     def surplus(self, x: Number) -> tuple[Number, Number]:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
+from stiction_client.arguments import shown, within
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
@@ -19,6 +20,9 @@ from stiction_client.linear_friction import (
     degrees_to_json,
 )
 from stiction_client.support import OUTDATED, SUPERSEDED, Domain
+
+VELOCITIES, FORCES = (0.0, 1e3, "m/s, as a magnitude"), (0.0, 1e300, "N an element")
+"""At which velocities and normal forces a model may be asked."""
 
 FILE_FORMAT, FILE_VERSION = "stiction-friction-model", 1
 
@@ -60,6 +64,21 @@ class FrictionModel(LinearFriction):
     created_at: str = ""
     scales: Scales | None = None
     outdated: bool = False
+
+    def predict(
+        self,
+        tangential_velocity: ArrayLike,
+        normal_force: ArrayLike,
+        quantile: float | None = None,
+        of: str = "element",
+        elements: float | None = None,
+    ) -> FloatArray:
+        """``LinearFriction.predict``; raises ``InvalidArgument`` for what is no velocity, force or quantile."""
+        v = within("tangential_velocity", tangential_velocity, *VELOCITIES)
+        f_n = within("normal_force", normal_force, *FORCES)
+        if quantile is not None and (isinstance(quantile, bool) or not isinstance(quantile, int | float | np.number)):
+            raise InvalidArgument("quantile", shown(quantile), "one number above 0 and below 1")
+        return LinearFriction.predict(self, v, f_n, quantile, of, elements)
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":

@@ -8,12 +8,12 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_client.arguments import within
+from stiction_client.arguments import shown, within
 from stiction_client.contacts import AREAS, Contact, Contacts
-from stiction_client.elementwise import FloatArray, Number, anywhere, least, select
+from stiction_client.elementwise import FloatArray, Number, anywhere, hypot, least, select
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact
-from stiction_client.linear_friction import KINDS
+from stiction_client.linear_friction import KINDS, LinearFriction
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 from stiction_client.support import Kind, kinds
@@ -153,7 +153,19 @@ def required_normal_force(
     Any argument but the model may be an array; all broadcast, and the answer is then ``RequiredForces``. For one
     grasp, raises ``NoFeasibleForce`` where no force holds. Raises ``InvalidArgument`` for an argument that cannot be.
     """
+    if not isinstance(model, LinearFriction):
+        raise InvalidArgument("model", shown(model), "a FrictionModel, as FrictionClient.model(name) gives it")
     together = _contacts(contact_area, contacts)
+    _check_shapes(
+        tangential_load=tangential_load,
+        slip_probability=slip_probability,
+        contact_area=together.contact.area,
+        torque=torque,
+        tangential_velocity=tangential_velocity,
+        safety_factor=safety_factor,
+        normal_force_limit=normal_force_limit,
+        elements=elements,
+    )
     velocity = within("tangential_velocity", tangential_velocity, 0.0, 1e3, "m/s, as a magnitude")
     probability = within("slip_probability", slip_probability, *SLIP_PROBABILITIES)
     load, moment = _shares(together, tangential_load, torque, within("safety_factor", safety_factor, *SAFETY_FACTORS))
@@ -192,6 +204,17 @@ class _Question:
     def element_force(self, x: Number) -> Number:
         """Mean normal force of the contact's elements, N."""
         return self.loaded.unit * x / self.contacts.contact.pressure_square
+
+
+def _check_shapes(**given: Number | None) -> None:
+    """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
+    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, float | int | None)}
+    try:
+        np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        sized = {name: str(list(shape)) for name, shape in shapes.items() if shape}
+        allowed = "one length, or any shapes that broadcast"
+        raise InvalidArgument(" and ".join(sized), " and ".join(sized.values()), allowed) from None
 
 
 def _kind(model: FrictionModel, of: str | None) -> str:
@@ -247,7 +270,7 @@ def _shares(
     )
     turns = within("torque", torque, 0.0, LARGEST, "N·m, as a magnitude") * (safety_factor / contacts.count)
     if contacts.lever_arm is not None:
-        return (load * load + (turns / contacts.lever_arm) ** 2) ** 0.5, 0.0
+        return hypot(load, turns / contacts.lever_arm), 0.0
     contact = contacts.contact
     if anywhere(contact.torque_arm == 0.0) and anywhere(turns > 0.0):
         raise InvalidArgument("torque", float(np.max(torque)), "0 where the contact has no torque_arm")
@@ -260,7 +283,7 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
     low, high, holds = loaded.interval(most)
     best = loaded.best(most)
     per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.contacts.count)
-    largest = math.inf if math.isinf(best) else per_load * loaded.multiple(best) if best > 0.0 else 0.0
+    largest = math.inf if math.isinf(best) else loaded.held(best, per_load) if best > 0.0 else 0.0
     if not holds:
         raise NoFeasibleForce(
             float(tangential_load),

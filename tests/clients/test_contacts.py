@@ -253,3 +253,42 @@ def test_a_torque_on_a_contact_without_arm_is_refused(make_model: Make) -> None:
         required_normal_force(make_model(), 1.0, contacts=Contact(AREA), torque=0.1)
     without = required_normal_force(make_model(), 1.0, contacts=Contact(AREA))
     assert without.normal_force == required_normal_force(make_model(), 1.0, contacts=Contact.flat(AREA)).normal_force
+
+
+def test_the_largest_load_is_the_same_however_small_the_load_that_is_asked_for(make_model: Make) -> None:
+    model = make_model((0.45, 0.0, -0.3), np.diag([1e-4, 0.0, 1e-2]))
+    for contact in (Contact.flat(6e-5), Contact.round(6e-5, at_force=5.0)):
+        answers = [required_normal_force(model, load, contacts=contact) for load in (0.0, 1e-300, 1e-30, 1e-3)]
+        assert [each.largest_load for each in answers] == pytest.approx([answers[0].largest_load] * 4, rel=1e-9)
+        held = [each.friction_coefficient * each.normal_force for each in answers[1:3]]
+        assert np.all(np.array(held) >= np.array([1e-300, 1e-30]) * (1.0 - 1e-9))
+
+
+def test_arrays_of_other_lengths_are_refused_by_name(make_model: Make) -> None:
+    wrong = r"^tangential_load and torque is \[3\] and \[4\]; allowed: one length, or any shapes that broadcast$"
+    with pytest.raises(InvalidArgument, match=wrong):
+        required_normal_force(make_model(), np.ones(3), contact_area=6e-5, torque=np.zeros(4))
+
+
+@pytest.mark.parametrize("model", ["paper", {"coefficients": [0.4, 0.0, 0.0]}, None])
+def test_only_a_model_is_taken_for_one(model: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^model is .*; allowed: a FrictionModel, as FrictionClient\.model"):
+        required_normal_force(model, 1.0, contact_area=6e-5)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "message"),
+    [
+        ([0.0], [0.0, 1e-3], r"pressure, x and y is \[2\] and \[1\] and \[2\] numbers"),
+        ([0.0, "a"], [0.0, 1e-3], "^x is "),
+        ([0.0, 1e-3], [0.0, np.nan], "^y is nan; allowed: -1 to 1 m"),
+    ],
+)
+def test_a_measured_pressure_has_a_place_for_each_element(x: Any, y: Any, message: str) -> None:
+    with pytest.raises(InvalidArgument, match=message):
+        Contact.measured(np.array([1e3, 2e3]), x, y, 1e-6)
+
+
+def test_fingers_are_whole() -> None:
+    with pytest.raises(InvalidArgument, match=r"^count is 2\.5; allowed: a whole number: 1 to 100 fingers$"):
+        n_fingers(2.5, Contact.flat(6e-5), object_radius=0.03)  # type: ignore[arg-type]

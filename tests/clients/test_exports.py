@@ -62,7 +62,7 @@ def test_a_quantile_that_is_not_conservative_is_refused(
 def test_a_model_too_uncertain_to_promise_friction_is_not_exported(
     make_model: Make, export: Callable[..., Any]
 ) -> None:
-    with pytest.raises(InvalidArgument, match=r"friction coefficient at quantile 0\.05 is 0; allowed: above 0"):
+    with pytest.raises(InvalidArgument, match=r"friction coefficient at quantile 0\.05, .* is 0; allowed: above 0"):
         export(make_model(scale=1.0), 0.1)
 
 
@@ -289,3 +289,35 @@ def test_graspit_has_glass_and_no_pair_with_what_has_no_friction(make_model: Mak
     assert graspit_friction(make_model(), ("glass", "stone"), 0.1).materials == ("glass", "stone")
     with pytest.raises(InvalidArgument, match="materials is 'frictionless'; allowed: two of glass, metal, plastic"):
         graspit_friction(make_model(), ("frictionless", "stone"), 0.1)
+
+
+@pytest.mark.parametrize(
+    "export", [conservative_friction, drake_friction, physx_material, mujoco_friction, dexnet_friction]
+)
+@pytest.mark.parametrize(
+    ("force", "message"),
+    [
+        (np.nan, r"^normal_force is nan; "),
+        (-1.0, r"^normal_force is -1\.0; allowed: 0 to "),
+        ("8 N", r"^normal_force is '8 N'; allowed: numbers: "),
+        ([0.05, 0.06], r"^normal_force is \[0\.05, 0\.06\]; allowed: one number"),
+        (1e9, r"^friction coefficient at quantile 0\.05, 1e\+09 N an element and 0 m/s is 0; allowed: above 0"),
+    ],
+)
+def test_an_export_names_a_force_that_cannot_be(
+    make_model: Make, export: Callable[..., object], force: Any, message: str
+) -> None:
+    with pytest.raises(InvalidArgument, match=message):
+        export(make_model(), force, allow_unidentified=True)
+
+
+@pytest.mark.parametrize("geoms", ["ab", ("a",), ("a", "a"), ("a", 1), ("", "b"), None])
+def test_a_pair_is_of_two_geoms(make_model: Make, geoms: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^geoms is .*; allowed: the names of two geoms"):
+        mujoco_pair(make_model(), geoms, 5.0, PAD, allow_unidentified=True)
+
+
+def test_names_in_xml_are_written_as_xml(make_model: Make) -> None:
+    name = 'left <"finger"> & thumb'
+    assert ElementTree.fromstring(MujocoPair(name, "b", 0.5, 0.0, 0.0).to_xml()).attrib["geom1"] == name
+    assert ElementTree.fromstring(urdf_gazebo(make_model(), name, 0.05)).attrib["reference"] == name

@@ -85,8 +85,8 @@ def test_the_limit_itself_holds_and_nothing_does_below_what_is_needed() -> None:
 def test_the_best_force_holds_more_than_any_other(power: int, load: float, moment: float) -> None:
     contact = LoadedContact(UNSURE, load, moment, 0.02, power)
     best = contact.best(1e3)
-    most = max(contact.multiple(x) for x in np.geomspace(1e-3 * best, 50.0, 4000))
-    assert contact.multiple(best) >= most * (1.0 - 1e-9)
+    most = max(contact.held(x, 1.0) for x in np.geomspace(1e-3 * best, 50.0, 4000))
+    assert contact.held(best, 1.0) >= most * (1.0 - 1e-9)
     growth, bend = contact._growth(best)
     assert growth == pytest.approx(0.0, abs=1e-7)
     step = 1e-5 * best
@@ -102,8 +102,10 @@ def test_there_is_no_best_where_friction_does_not_end_and_none_where_it_never_be
 
 @pytest.mark.parametrize(("power", "held"), [(1, 0.5 * 8.0 / 5.0), (3, 0.5 * 8.0**3 / math.hypot(3.0, 4.0 / 8.0))])
 def test_how_many_times_the_load_is_held(power: int, held: float) -> None:
-    assert LoadedContact(SURE, 3.0, 4.0, 0.01, power).multiple(8.0) == pytest.approx(held)
-    assert LoadedContact(SURE, 0.0, 0.0, 0.01, power).multiple(8.0) == pytest.approx(0.5 * 8.0**power)
+    assert LoadedContact(SURE, 3.0, 4.0, 0.01, power).held(8.0, 1.0) == pytest.approx(held)
+    tiny = LoadedContact(SURE, 3e-300, 4e-300, 0.01, power)  # whose squares are 0
+    assert tiny.held(8.0, 1e-300) == pytest.approx(held)
+    assert LoadedContact(SURE, 0.0, 0.0, 0.01, power).held(8.0, 1.0) == pytest.approx(0.5 * 8.0**power)
 
 
 def test_were_nothing_uncertain_the_mean_would_hold() -> None:

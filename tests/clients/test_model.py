@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -218,3 +219,19 @@ def test_a_file_that_holds_no_model_is_refused(tmp_path: Path, content: str, mes
     (tmp_path / "paper.json").write_text(content)
     with pytest.raises(InvalidArgument, match=message):
         FrictionModel.load(tmp_path / "paper.json")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((-1e-3, 0.05), r"^tangential_velocity is -0\.001; allowed: 0 to 1000 m/s, as a magnitude$"),
+        ((True, 0.05), r"^tangential_velocity is True; allowed: numbers: "),
+        ((0.0, [0.05, "x"]), r"^normal_force is .*; allowed: numbers: 0 to 1e\+300 N an element$"),
+        ((0.0, np.nan), r"^normal_force is nan; "),
+        ((0.0, 0.05, [0.05, 0.5]), r"^quantile is \[0\.05, 0\.5\]; allowed: one number above 0 and below 1$"),
+        ((0.0, 0.05, True), r"^quantile is True; "),
+    ],
+)
+def test_a_model_is_asked_at_a_velocity_and_a_force(make_model: Make, arguments: Any, message: str) -> None:
+    with pytest.raises(InvalidArgument, match=message):
+        make_model().predict(*arguments)

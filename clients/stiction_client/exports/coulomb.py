@@ -5,11 +5,11 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from stiction_client.arguments import within
+from stiction_client.arguments import shown, within
 from stiction_client.contacts import AREAS
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import FrictionModel
+from stiction_client.model import FORCES, VELOCITIES, FrictionModel
 
 QUANTILE = 0.05
 """Default: nineteen observations of twenty have more friction."""
@@ -44,16 +44,23 @@ def conservative_friction(
     of μ isn't positive, and for friction that is not determined or implausible: pass
     ``allow_unidentified`` to have the quantile anyway.
     """
+    v, f_n = (
+        within("tangential_velocity", tangential_velocity, *VELOCITIES),
+        within("normal_force", normal_force, *FORCES),
+    )
+    if isinstance(v, np.ndarray) or isinstance(f_n, np.ndarray):
+        raise InvalidArgument("normal_force", shown(normal_force), "one number: call once for each")
     if not 0.0 < quantile <= 0.5:
         raise InvalidArgument("quantile", quantile, "above 0, at most 0.5: a bound from below")
     elements = max(float(within("contact_area", contact_area, *AREAS, "m²")) / model.element_area, 1.0)
-    support = model.support_at(tangential_velocity, normal_force)
+    support = model.support_at(v, f_n)
     if not allow_unidentified and support.kind in ("not identified", "implausible"):
         allowed = "supported, or allow_unidentified=True"
         raise InvalidArgument(f"friction of {model.material!r}", f"{support.kind} ({support.advice})", allowed)
-    friction = float(model.predict(tangential_velocity, normal_force, quantile, of="contact", elements=elements))
+    friction = float(model.predict(v, f_n, quantile, of="contact", elements=elements))
     if not 0.0 < friction < math.inf:
-        raise InvalidArgument(f"friction coefficient at quantile {quantile:g}", f"{friction:.4g}", "above 0")
+        where = f"quantile {quantile:g}, {f_n:g} N an element and {v:g} m/s"
+        raise InvalidArgument(f"friction coefficient at {where}", f"{friction:.4g}", "above 0")
     return friction
 
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from typing import Unpack
+from xml.sax.saxutils import quoteattr
 
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
 from stiction_client.model import FrictionModel
@@ -62,7 +63,7 @@ def urdf_gazebo(
 ) -> str:
     """Gazebo's extension of a URDF ``link``; URDF itself has no friction of contacts."""
     friction = conservative_friction(model, normal_force, quantile, **terms)
-    return f'<gazebo reference="{link}"><mu1>{friction:.9g}</mu1><mu2>{friction:.9g}</mu2></gazebo>'
+    return f"<gazebo reference={quoteattr(link)}><mu1>{friction:.9g}</mu1><mu2>{friction:.9g}</mu2></gazebo>"
 
 
 def dexnet_friction(model: FrictionModel, normal_force: float, **terms: Unpack[Terms]) -> dict[str, float]:
@@ -71,8 +72,8 @@ def dexnet_friction(model: FrictionModel, normal_force: float, **terms: Unpack[T
     Its grasps are scored over random friction, so that the spread is the caution here: that of a new observation, from
     the quantile one standard deviation below the mean.
     """
-    expected = float(model.predict(0.0, normal_force))
     conservative_friction(model, normal_force, **terms)  # refuses what promises no friction
+    expected = float(model.predict(0.0, normal_force))
     below = conservative_friction(model, normal_force, ONE_DEVIATION, **terms)
     return {"friction_coef": expected, "sigma_friction_coef": (expected - below) ** 2}
 

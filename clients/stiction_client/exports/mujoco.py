@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass
 from typing import Unpack
+from xml.sax.saxutils import quoteattr
 
-from stiction_client.arguments import within
+from stiction_client.arguments import shown, whole, within
 from stiction_client.contacts import HERTZ_TORSION, Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
@@ -40,7 +41,8 @@ class MujocoPair:
         condim = 4 if self.torsional > 0.0 else 3
         numbers = " ".join(f"{value:.9g}" for value in friction)
         pulls = f' adhesion="{self.adhesion:.9g}"' if self.adhesion > 0.0 else ""
-        return f'<pair geom1="{self.geom1}" geom2="{self.geom2}" condim="{condim}" friction="{numbers}"{pulls}/>'
+        geoms = f"geom1={quoteattr(self.geom1)} geom2={quoteattr(self.geom2)}"
+        return f'<pair {geoms} condim="{condim}" friction="{numbers}"{pulls}/>'
 
 
 def mujoco_pair(
@@ -62,8 +64,9 @@ def mujoco_pair(
     Raises ``InvalidArgument`` where the quantile isn't positive, and where no adhesion stands for its slope: friction
     that grows with force, or falls so fast that pressing harder holds less.
     """
+    first, second = _names(geoms)
     force = float(within("grip_force", grip_force, 1e-9, 1e9, "N"))
-    count = int(within("points", points, 1, 1000, "points"))
+    count = whole("points", points, 1, 1000, "points")
     element = float(contact.element_force(force, model.element_area))
     elements = max(float(contact.elements(force, model.element_area)), 1.0)
     friction = conservative_friction(
@@ -71,7 +74,7 @@ def mujoco_pair(
     )
     arm = float(contact.arm(force))
     if not load_faithful:
-        return MujocoPair(*geoms, friction, arm * friction, 0.0)
+        return MujocoPair(first, second, friction, arm * friction, 0.0)
     _, slope = FrictionQuantile.of(model, 0.0, quantile, elements)(element)
     sliding = friction + element * float(slope) / contact.power
     if sliding > friction or sliding <= 0.0:
@@ -80,7 +83,15 @@ def mujoco_pair(
         raise InvalidArgument(
             "load_faithful", f"True with {what}", "friction that falls gently, or load_faithful=False"
         )
-    return MujocoPair(*geoms, sliding, arm * sliding, force * (friction / sliding - 1.0) / count)
+    return MujocoPair(first, second, sliding, arm * sliding, force * (friction / sliding - 1.0) / count)
+
+
+def _names(geoms: tuple[str, str]) -> tuple[str, str]:
+    """The names of two geoms; raises ``InvalidArgument`` for anything else."""
+    names = tuple(geoms) if isinstance(geoms, tuple | list) else ()
+    if len(names) != 2 or not all(isinstance(name, str) and name for name in names) or names[0] == names[1]:
+        raise InvalidArgument("geoms", shown(geoms), 'the names of two geoms, such as ("fingertip", "box")')
+    return names
 
 
 def mujoco_friction(
