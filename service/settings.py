@@ -240,5 +240,17 @@ def complaints(error: ValidationError) -> str:
 def _complaint(name: str, value: object, message: str) -> str:
     field = Settings.model_fields.get(name)
     shown = repr(str(value))[:100] if field is not None and field.repr else "not one that is allowed"
-    allowed = message.removeprefix("Input should be ").removeprefix("Value error, ")
+    allowed = _range(name) or message.removeprefix("Input should be ").removeprefix("Value error, ")
     return f"{PREFIX}{name.upper()} is {shown}; allowed: {allowed} (docs/settings.md)"
+
+
+def _range(name: str) -> str | None:
+    """What a setting that is a number may be, both ends of it; None of any other."""
+    schema = Settings.model_json_schema()["properties"].get(name, {})
+    parts = [part for part in schema.get("anyOf", [schema]) if "maximum" in part]
+    if not parts:
+        return None
+    (number,) = parts
+    low = f"{number['minimum']}" if "minimum" in number else f"above {number['exclusiveMinimum']}"
+    whole = "whole " if number["type"] == "integer" else ""
+    return f"a {whole}number, {low} to {number['maximum']}"

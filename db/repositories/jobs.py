@@ -3,6 +3,7 @@
 import uuid
 from collections.abc import Collection, Mapping
 from datetime import datetime
+from typing import cast
 
 from sqlalchemy import ColumnElement, Select, false, func, select, update
 from sqlalchemy.orm import Session
@@ -73,6 +74,14 @@ def list_all(session: Session, window: Window, status: JobStatus | None = None) 
         query = query.where(JobRow.status == status)
     found = session.execute(windowed(query, window, {"created_at": JobRow.created_at}, JobRow.id))
     return [record(*row) for row in found]
+
+
+def newest_ingest(session: Session, material_id: int) -> tuple[JobStatus, str | None] | None:
+    """How the newest log of a material that was not withdrawn fared, and why it ended so; None where there is none."""
+    query = select(JobRow.status, JobRow.reason).join(GraspLogRow, GraspLogRow.id == JobRow.grasp_log_id)
+    query = query.where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
+    row = session.execute(query.order_by(GraspLogRow.number.desc(), GraspLogRow.id.desc()).limit(1)).first()
+    return None if row is None else (cast(JobStatus, row.status), row.reason)
 
 
 def move_unfinished(session: Session, source_id: int, target_id: int) -> None:

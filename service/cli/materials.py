@@ -25,7 +25,8 @@ def list_materials(url: Url = DEFAULT_URL, key: Key = None, json: Json = False) 
     if json:
         print_json({"materials": [asdict(material) for material in found]})
     else:
-        print_table("Materials", ("name", "grasp logs", "μ", "method", "made"), [_row(material) for material in found])
+        columns = ("name", "grasp logs", "μ", "method", "support", "made")
+        print_table("Materials", columns, [_row(material) for material in found])
 
 
 @app.command()
@@ -40,6 +41,7 @@ def show(material: MaterialName, url: Url = DEFAULT_URL, key: Key = None, json: 
         ("grasp logs", str(found.grasp_logs)),
         ("made", when(found.created_at)),
         ("recommended", found.recommended),
+        ("support", _support(found)),
     ]
     print_lines(found.name, [("about", found.description or None), *about])
     columns = ("method", "version", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples")
@@ -110,10 +112,19 @@ def _row(material: "Material") -> list[str | None]:
     name, made, logs = material.name, when(material.created_at), str(material.grasp_logs)
     model = material.models.get(material.recommended or "")
     if model is None:
-        return [name, logs, None, None, made]
-    low, high = model.domain.normal_force
-    expected = float(model.predict(0.0, 0.5 * (low + high)))
-    return [name, logs, number(expected), model.method, made]
+        return [name, logs, None, None, None, made]
+    middle = 0.5 * sum(model.domain.normal_force)
+    expected = float(model.predict(0.0, middle))
+    return [name, logs, number(expected), model.method, model.support_at(0.0, middle).kind, made]
+
+
+def _support(material: "Material") -> str | None:
+    """What the recommended model rests on in the middle of its data, and what to do about it."""
+    model = material.models.get(material.recommended or "")
+    if model is None:
+        return None
+    support = model.support_at(0.0, 0.5 * sum(model.domain.normal_force))
+    return f"{support.kind}: {support.advice}"
 
 
 def _model_row(model: "FrictionModel") -> list[str | None]:

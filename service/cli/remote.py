@@ -97,7 +97,7 @@ def lookup(
     with connected(url, key) as client:
         force, area = normal_force, element_area
         if force is None:
-            model = client.model(material, method=method)
+            model = _model(client, material, method)
             force = _middle_force(model) * (1.0 if area is None else area / model.element_area)
         answer = client.friction(
             material, velocity, force, quantile, method, elements=elements, sensor=sensor, element_area=area
@@ -179,7 +179,7 @@ def plan(
 
     _check_area(contact_area)
     with connected(url, key) as client:
-        model = client.model(material, method=method)
+        model = _model(client, material, method)
     model = model if sensor is None else model.on_sensor(sensor)
     answer = required_normal_force(
         model,
@@ -197,6 +197,17 @@ def plan(
         print_json({"method": model.method, "version": model.version, **asdict(answer)})
     else:
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
+
+
+def _model(client: "FrictionClient", material: str, method: str) -> "FrictionModel":
+    """A material's model; where there is none, raises the service's own refusal, which says what it knows instead."""
+    from stiction_client import NoModel
+
+    try:
+        return client.model(material, method=method)
+    except NoModel:
+        client.friction(material, 0.0, 0.0, method=method)
+        raise
 
 
 def _check_area(area: float) -> None:

@@ -63,7 +63,11 @@ def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]
         url = settings.resolved_database_url
     database = Database(url)
     if database.is_missing and not may_be_new:
-        raise NotFound("database", str(database.engine.url.database))
+        missing = NotFound("database", str(database.engine.url.database))
+        missing.add_note(
+            "`stiction serve` makes one; STICTION_DATA_FOLDER or STICTION_DATABASE_URL names another (docs/settings.md)"
+        )
+        raise missing
     try:
         yield database
     finally:

@@ -167,7 +167,7 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
     assert lines[0].startswith(
         "STICTION_DATABASE_URL is not one that is allowed; allowed: a file or a server: a database in memory"
     )
-    assert lines[1] == "STICTION_READERS is '0'; allowed: greater than or equal to 1 (docs/settings.md)"
+    assert lines[1] == "STICTION_READERS is '0'; allowed: a whole number, 1 to 64 (docs/settings.md)"
     assert lines[2].startswith(
         "STICTION_WEBHOOK_SECRET is not one that is allowed; allowed: String should have at least"
     )
@@ -175,6 +175,24 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
         "STICTION_WEBHOOK_URL is not one that is allowed; allowed: an http or https URL, such as"
     )
     assert not {"hush", "hu℀sh"} & set(re.findall(r"[^\W_]+", "".join(lines)))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("STICTION_PORT", "eighty", "a whole number, 0 to 65535"),
+        ("STICTION_LOOKUP_PORT", "99999", "a whole number, 0 to 65535"),
+        ("STICTION_LEASE_SECONDS", "0", "a number, 0.5 to 600.0"),
+        ("STICTION_IDEMPOTENCY_HOURS", "0", "a number, above 0.0 to 8760.0"),
+    ],
+)
+def test_of_a_number_both_ends_of_its_range_are_told(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, allowed: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    with pytest.raises(ValidationError) as refusal:
+        Settings()
+    assert complaints(refusal.value) == f"{name} is '{value}'; allowed: {allowed} (docs/settings.md)"
 
 
 @pytest.mark.parametrize("text", ["", "10.0.0.7", "10.0.0.7, 10.1.0.0/16", "::1,", "fd00::/8"])

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import Job, StoredModel
-from db.repositories import detections, friction_models, materials
+from db.repositories import detections, friction_models, jobs, materials
 from service.domain.errors import NoModel
 from service.domain.models.recommended import AUTO, disagreeing, recommended
 from service.domain.models.stored_results import to_friction_model
@@ -221,20 +221,32 @@ def _chosen(session: Session, material: str, material_id: int, models: Sequence[
         found = recommended(models)
         if found is not None:
             return _Current(found.stored, found.because, models)
-    raise NoModel(f"material {material!r} has no model fitted by {method!r} yet{_bound(session, material_id)}", method)
+    fitted = ", ".join(sorted(stored.model.method for stored in models))
+    known = f"; fitted: {fitted}" if fitted else _without_model(session, material_id)
+    raise NoModel(f"material {material!r} has no model fitted by {method!r} yet{known}", method)
 
 
-def _bound(session: Session, material_id: int) -> str:
-    """What is known without a model, if anything: by its newest logs that nothing speaks against."""
+def _without_model(session: Session, material_id: int) -> str:
+    """What is known without a model: a bound by its newest logs that nothing speaks against, else what became of the
+    newest of all.
+    """
     bounds = detections.least_frictions(session, material_id, MOST_BOUNDS)
     sound = [least for least, names in bounds if all(severity_of(name) != "warning" for name in names)]
     least = max(sound, default=0.0)
     if least <= 0.0:
-        return ""
+        return _newest_log(session, material_id)
     return (
         f"; of its newest grasps the one that held best bore a load for which friction was at least {least:.2g}: the "
         "next one may hold less"
     )
+
+
+def _newest_log(session: Session, material_id: int) -> str:
+    newest = jobs.newest_ingest(session, material_id)
+    if newest is None:
+        return ": it has no grasp log; upload one in which the contact slips"
+    status, reason = newest
+    return f"; its newest log is {status}{f': {reason}' if reason else ''}"
 
 
 def _tag(stored: StoredModel, disagreement: str | None) -> str:

@@ -485,7 +485,7 @@ def test_wrong_usage_is_told_from_refused_input(run: Run, arguments: tuple[objec
 def test_a_setting_out_of_range_is_refused_by_name(run: Run) -> None:
     code, _, err = run("serve", "--port", 99999)
     assert code == INPUT_REFUSED
-    assert "STICTION_PORT is '99999'; allowed: less than or equal to 65535" in err
+    assert "STICTION_PORT is '99999'; allowed: a whole number, 0 to 65535" in err
 
 
 def test_a_worker_without_workers_is_wrong_usage(run: Run) -> None:
@@ -646,6 +646,7 @@ def test_a_command_in_the_wrong_folder_leaves_nothing_there(
     code, _, err = run(*command)
     assert code == INPUT_REFUSED
     assert f"no database '{tmp_path / 'wrong' / 'stiction.sqlite3'}' is stored" in err
+    assert "`stiction serve` makes one; STICTION_DATA_FOLDER or" in err
     assert not list(tmp_path.iterdir())
 
 

@@ -19,7 +19,7 @@ from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
 from service.cli.local import fit
 from slipcore import InvalidInput
 from slipcore.contact import simulate
-from stiction_client import FrictionClient, RequiredForce, grasp, required_normal_force
+from stiction_client import FrictionClient, NoModel, ProblemError, RequiredForce, grasp, required_normal_force
 from stiction_client.records import FrictionAnswer, Material, NextGrasp, Withdrawal
 from stiction_client.stream import SlipStream
 from tests.service.report.test_material import JOB, LOG, MODEL, SEEN
@@ -109,6 +109,21 @@ def test_friction_is_looked_up_in_the_middle_of_the_data_for_as_large_an_element
     assert client.friction.call_args.args == ("paper", 0.0, 0.05, 0.05, "auto")
     assert client.friction.call_args.kwargs == {"elements": 9, "sensor": None, "element_area": 1e-6}
     client.model.assert_not_called()
+
+
+@pytest.mark.parametrize("command", [["lookup", "paper"], ["plan", "paper", "--load", "1", "--contact-area", "6e-5"]])
+def test_without_a_model_the_service_says_what_it_knows_instead(
+    client: Mock, command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    client.model.side_effect = NoModel("material 'paper' has no fitted model of method 'auto'; fitted: none")
+    client.friction.side_effect = ProblemError("/problems/no-model", 409, "friction was at least 0.3")
+    with pytest.raises(SystemExit):
+        main(command)
+    assert "friction was at least 0.3" in capsys.readouterr().err
+    client.friction.side_effect = None
+    with pytest.raises(SystemExit):
+        main(command)
+    assert "fitted: none" in capsys.readouterr().err
 
 
 def test_what_is_looked_up_is_told_with_all_that_was_said_of_it(client: Mock, say: Say) -> None:
@@ -242,11 +257,12 @@ def test_a_material_is_listed_with_its_friction_in_the_middle_of_the_data(client
     paper = Material("paper", "", "2026-01-01T00:00:00+00:00", 3, {"hierarchical": MODEL}, "hierarchical")
     client.materials.return_value = [paper, replace(paper, name="felt", models={}, recommended=None)]
     rows = [line.split() for line in say("materials", "list").splitlines()[3:]]
-    assert rows[0][:4] == ["paper", "3", "0.449", "hierarchical"]
+    assert rows[0][:5] == ["paper", "3", "0.449", "hierarchical", "not"]  # identified
     assert rows[1][:3] == ["felt", "3", "2026-01-01"]
     client.material.return_value = paper
     shown = say("materials", "show", "paper")
     assert "about" not in shown
+    assert "  support      not identified: " in shown
     assert shown.splitlines()[-1].split()[:3] == ["hierarchical", "3", "0.450"]
 
 

@@ -222,3 +222,26 @@ def test_without_a_model_few_logs_are_read_for_a_bound_of_friction(
             detections.add(session, grasp_logs.add(session, log), detection, none)
     with pytest.raises(NoModel, match=r"newest grasps .* friction was at least 0\.3:"):
         ModelCache().read(database, "held", "ols")
+
+
+def test_without_a_model_and_a_bound_it_is_told_what_became_of_the_newest_log(database: Database) -> None:
+    with database.write() as session:
+        material_id = materials.create(session, "held", "").id
+    with pytest.raises(NoModel, match=r"it has no grasp log; upload one in which the contact slips$"):
+        ModelCache().read(database, "held", "auto")
+    with database.write() as session:
+        ids = list[str]()
+        for number in range(2):
+            log = NewGraspLog(f"{number:064x}", 1, "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
+            ids.append(grasp_logs.add(session, log))
+            job = jobs.add(session, "ingest", "auto", material_id=material_id, grasp_log_id=ids[-1])
+    with pytest.raises(NoModel, match=r"its newest log is queued$"):
+        ModelCache().read(database, "held", "auto")
+    with database.write() as session:
+        jobs.cancel(session, job, "nobody wants it")
+    with pytest.raises(NoModel, match=r"its newest log is cancelled: nobody wants it$"):
+        ModelCache().read(database, "held", "auto")
+    with database.write() as session:
+        grasp_logs.withdraw(session, ids[-1], "mislabelled")
+    with pytest.raises(NoModel, match=r"its newest log is queued$"):
+        ModelCache().read(database, "held", "auto")
