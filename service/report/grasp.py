@@ -81,7 +81,8 @@ def _sections(seen: InspectedGrasp) -> list[Section]:
     if seen.detection.findings:
         rows = [[each.name, each.evidence, each.remedy] for each in seen.detection.findings]
         doubts = Table("Findings", ("finding", "evidence", "what to do"), rows)
-        sections.append(Section("What makes its friction doubtful", tables=[doubts]))
+        heading = wording.findings_heading([each.name for each in seen.detection.findings])
+        sections.append(Section(heading, tables=[doubts]))
     if seen.model is not None:
         sections.append(_model_section(seen.samples, seen.model))
     return [*sections, _detection_section(seen.detection)]

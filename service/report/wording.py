@@ -1,10 +1,11 @@
 """Sentences and tables that describe a model, the same on every page."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from service.formatting import interval, number
 from service.report.page import Fact, Table
+from slipcore.finding import severity_of
 from stiction_client.linear_friction import LinearFriction
 from stiction_client.support import Support
 
@@ -83,6 +84,12 @@ def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
     notes |= {note for model in models.values() for note in model.notes}
     caption = "; ".join(["Estimates and 95 % intervals", *sorted(notes)])
     return Table(caption, ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
+
+
+def findings_heading(names: Iterable[str]) -> str:
+    """What findings of these names are about: only a warning makes friction doubtful."""
+    is_doubtful = any(severity_of(name) == "warning" for name in names)
+    return "What makes its friction doubtful" if is_doubtful else "What limits its friction"
 
 
 def estimates(model: LinearFriction) -> list[str]:

@@ -15,7 +15,7 @@ from service import formatting
 from service.domain.sensors.reconstruct import BY_DISPLACEMENT
 from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
-from service.report.wording import record_next
+from service.report.wording import findings_heading, record_next
 from service.web.assets import path_of
 
 POLICY = (
@@ -69,5 +69,6 @@ def _environment() -> Environment:
     environment.filters["has_reconstructed_forces"] = has_reconstructed_forces
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
     environment.filters["with_code"] = with_code
+    environment.filters["findings_heading"] = findings_heading
     environment.globals["asset"] = path_of
     return environment

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from service.formatting import number
-from service.report.wording import coefficient_table, estimates, friction_facts, record_next
+from service.report.wording import coefficient_table, estimates, findings_heading, friction_facts, record_next
 from tests.service.report.test_material import MODEL, PROBE
 
 
@@ -50,3 +50,14 @@ def test_remarks_on_models_stand_once_below_their_table() -> None:
 def test_a_mark_is_of_its_own_coefficient(identifiable: tuple[bool, bool, bool]) -> None:
     cells = estimates(replace(MODEL, identifiable=np.array(identifiable)))
     assert [not cell.endswith("†") for cell in cells[:3]] == list(identifiable)
+
+
+@pytest.mark.parametrize(
+    ("names", "heading"),
+    [
+        (["rounded"], "What limits its friction"),
+        (["rounded", "force pulls"], "What makes its friction doubtful"),
+    ],
+)
+def test_only_a_warning_makes_friction_doubtful(names: list[str], heading: str) -> None:
+    assert findings_heading(names) == heading

@@ -116,6 +116,8 @@ def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> 
     assert "What makes its friction doubtful" in [section.heading for section in report.sections]
     assert any(step.startswith("force pulls: ") for step in report.steps[:-1])
     assert "Upload" not in report.steps[-1]
+    still = grasp_report(inspect_grasp(replace(log, time=1e3 * log.time), "slow"))  # a note
+    assert "What limits its friction" in [section.heading for section in still.sections]
 
 
 def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: InspectedGrasp) -> None:
