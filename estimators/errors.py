@@ -17,4 +17,4 @@ class InvalidSamples(EstimatorError, ValueError):
 
 
 class TooFewSamples(InvalidSamples):
-    """Not enough (distinct) samples to fit the model: no slip was seen, or hardly any."""
+    """Not enough (distinct) samples to fit the model: no slip gave any, or hardly any."""

@@ -93,7 +93,7 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     area = common_element_area([part.element_area for part in parts])
     parts = [part if part.element_area == area else part.at_element_area(area) for part in parts]
     if sum(map(len, parts)) == 0:
-        raise TooFewSamples("samples", "none (no slip was seen)", f"at least {LINEAR.min_samples}")
+        raise TooFewSamples("samples", "none (no slip gave one)", f"at least {LINEAR.min_samples}")
     values = check_columns(parts)
     weight = _relative_weight(values.pop("weight"))
     used = positive(weight)

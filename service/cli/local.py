@@ -1,6 +1,7 @@
 """Commands that work on files, without a service: detect, check, fit, convert."""
 
 from dataclasses import asdict
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison
 
+FEW = 36
+"""Elements of an array, 6 × 6, up to which method "coarse" finds slip better than the default."""
+
 
 def detect(
     log: Log,
@@ -50,6 +54,7 @@ def detect(
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = inspect_log(grasp, method, sensor_model, gel)
+    _advise_method(seen.log, method)
     if picture is not None:
         from service.report.pictures import save, slip_over_time
 
@@ -77,11 +82,13 @@ def check(
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = inspect_log(grasp, method, sensor_model, gel)
+    _advise_method(seen.log, method)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
+    without = _without_friction(seen.log)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
         found = [_finding_record(each) for each in findings]
-        record = {"log": log.name, "findings": found, "contact_friction": contact}
+        record = {"log": log.name, "findings": found, "contact_friction": contact, "without_friction": without}
         print_json(record if compared is None else record | {"forces_by_gel": asdict(compared)})
         return
     for finding in findings:
@@ -91,6 +98,8 @@ def check(
     doubts = [finding.name for finding in findings if finding.severity == "warning"]
     if doubts:
         typer.echo(f"friction from this log is doubtful: {', '.join(doubts)}")
+    if without is not None:
+        typer.echo(f"no friction from this log: {without}")
     if contact is not None:
         typer.echo(f"friction of the contact: {_contact_line(contact)}")
     if compared is not None:
@@ -102,7 +111,10 @@ def fit(
     method: Annotated[str, typer.Option("--method", help=METHOD_HELP)] = "auto",
     detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     sensor_model: SensorModelFile = None,
     gel: GelFile = None,
     json: Json = False,
@@ -117,8 +129,10 @@ def fit(
     grasps = Grasps()
 
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
-        log = read_log(path, mapping)
+        log = read_log(path, mapping, scale, frame_rate, rest)
         seen = inspect_log(log, detector, sensor_model, gel)
+        if without := _without_friction(seen.log):
+            typer.echo(f"{path.name}: no friction from this log: {without}", err=True)
         return grasps.see(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
 
     first = dict[str, Path]()
@@ -170,7 +184,10 @@ def export(
         ),
     ],
     method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     sensor_model: SensorModelFile = None,
     gel: GelFile = None,
 ) -> None:
@@ -181,7 +198,7 @@ def export(
     exports.check_output(output, target)
 
     def recorded(path: Path) -> exports.DetectedLog:
-        seen = inspect_log(read_log(path, mapping), method, sensor_model, gel)
+        seen = inspect_log(read_log(path, mapping, scale, frame_rate, rest), method, sensor_model, gel)
         return exports.DetectedLog(seen.log, seen.history, path.name)
 
     recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))
@@ -285,6 +302,28 @@ def _contact_record(log: "GraspLog", history: "SlipHistory") -> dict[str, Any] |
     return None if found is None else asdict(found) | {"high": None if found.is_bound else found.high}
 
 
+def _advise_method(log: "GraspLog", method: str | None) -> None:
+    """Say which method is better, where the elements are few and none was named."""
+    rows, columns = log.grid
+    if method is None and rows * columns <= FEW and log.force is not None and log.has_displacement:
+        advice = "of so few, --method coarse finds slip better (docs/sensors.md#few-elements)"
+        typer.echo(f"{rows} × {columns} elements: {advice}", err=True)
+
+
+def _without_friction(log: "GraspLog") -> str | None:
+    """Why a log gives no friction samples whatever slips in it, and what to do; None where it may."""
+    if not log.is_scaled:
+        return "its scale is unknown: say how many metres a pixel is (--scale)"
+    if log.force is None:
+        return (
+            "it has no forces: describe the sensor's gel, from which they follow (--gel, docs/forces.md), or map the "
+            "columns that have them"
+        )
+    if not log.has_displacement:
+        return "it has no displacement, and with that no velocity: forces alone show slip"
+    return None
+
+
 def _contact_line(found: dict[str, Any] | None) -> str | None:
     if found is None:
         return None
@@ -302,7 +341,7 @@ def _detection_lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
         ("stick ratio", seen.get("smallest_stick_ratio") and f"{seen['smallest_stick_ratio']} at its smallest"),
         ("elements", f"{summary['touches']} touch, {begin} begin to slip, {end} stick again"),
         ("friction of the contact", _contact_line(summary["contact_friction"])),
-        ("marker noise", None if noise is None else f"{number(1e6 * noise)} µm"),
+        ("marker noise", None if noise is None or isnan(noise) else f"{number(1e6 * noise)} µm"),
         ("computed in", f"{seen['seconds']} s"),
         ("unknown", summary.get("unknown")),
     ]

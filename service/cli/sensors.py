@@ -9,7 +9,7 @@ import typer
 
 from service.cli.connection import connected
 from service.cli.inputs import read_log, refuse_inputs
-from service.cli.options import DEFAULT_URL, Json, Key, Url
+from service.cli.options import DEFAULT_URL, FrameRate, Json, Key, Rest, Scale, Url
 from service.cli.options import Mapping as MappingFile
 from service.cli.output import print_json, print_table
 from service.formatting import interval, number
@@ -137,7 +137,10 @@ def calibrate_gel(
             help="Of a gel not alike thick everywhere: a JSON file of rows, at each marker over its thickness."
         ),
     ] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     mapping: MappingFile = None,
+    rest: Rest = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the gel to this JSON, for --gel.")
     ] = None,
@@ -155,7 +158,7 @@ def calibrate_gel(
         refuse_inputs(output, *logs, mapping, relative_thickness)
     uneven = None if relative_thickness is None else _rows_of(relative_thickness)
     forces = _known_forces(known_force, len(logs))
-    presses = [read_log(path, mapping) for path in logs]
+    presses = [read_log(path, mapping, scale, frame_rate, rest) for path in logs]
     name = _sensor_name(sensor, presses[0].sensor) if store else ""
     with shown_progress("learning the gel"):
         found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise, uneven)

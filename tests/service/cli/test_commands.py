@@ -167,9 +167,33 @@ def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp
     seen = json.loads(out)
     assert (code, seen["marker_noise"]) == (0, None)
     assert "scale" in seen["unknown"]
+    assert (
+        "no friction from this log: its scale is unknown" in run("check", tmp_path / "dots.csv", "--frame-rate", 30)[1]
+    )
     assert run("detect", tmp_path / "dots.csv")[0] == INPUT_REFUSED
     assert run("convert", dots, tmp_path / "log.npz", "--rest", dots)[0] == 0
     assert formats.read(tmp_path / "log.npz").metadata["rest"] == "file of rest"
+
+
+@pytest.mark.parametrize(
+    "command", [["fit"], ["export", "--output", "out.mcap"], ["sensors", "calibrate-gel", "--known-force", 1.0]]
+)
+def test_every_command_that_reads_logs_takes_what_a_table_leaves_out(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[object]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    dots = tmp_path / "dots.csv"
+    dots.write_text("frame,marker,x,y\n" + "".join(f"{k},0,1,2\n" for k in range(3)), encoding="utf-8")
+    assert "frame_rate is missing" in run(*command, dots)[2]
+    assert "frame_rate" not in run(*command, dots, "--frame-rate", 30, "--scale", 2.5e-5)[2]
+    assert "rest is 'nonsense'" in run(*command, dots, "--frame-rate", 30, "--rest", "nonsense")[2]
+
+
+def test_of_few_elements_a_better_method_is_named_where_none_was(run: Run, tmp_path: Path) -> None:
+    few = tmp_path / "few.npz"
+    container.write(tangential_ramp(points=4, pitch=3.8e-3, normal_force=6.0, marker_noise=1e-6, seed=1), few)
+    assert "4 × 4 elements: of so few, --method coarse finds slip better" in run("check", few)[2]
+    assert "coarse" not in run("check", few, "--method", "force_ratio")[2]
 
 
 def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_reads(run: Run, tmp_path: Path) -> None:
@@ -916,7 +940,9 @@ def without_forces(log: GraspLog, path: Path) -> Path:
 def test_a_log_without_forces_is_fitted_by_its_gel(run: Run, gel: Path, tmp_path: Path) -> None:
     own = tangential_ramp(points=16, pitch=0.96e-3, friction=0.5, normal_force=20.0, marker_noise=1e-6, seed=1)
     log = without_forces(own, tmp_path / "unfelt.npz")
-    assert run("fit", log)[0] == INPUT_REFUSED
+    code, _, err = run("fit", log)
+    assert code == INPUT_REFUSED
+    assert f"{log.name}: no friction from this log: it has no forces: describe the sensor's gel" in err
     code, out, err = run("fit", log, "--gel", gel, "--method", "ols", "--json")
     assert code == 0
     assert json.loads(out)["coefficients"][0] == pytest.approx(0.5, abs=0.05)
@@ -925,6 +951,9 @@ def test_a_log_without_forces_is_fitted_by_its_gel(run: Run, gel: Path, tmp_path
 
 def test_a_log_without_forces_is_looked_at_by_its_gel(run: Run, felt: Path, gel: Path, tmp_path: Path) -> None:
     log = without_forces(formats.read(felt), tmp_path / "unfelt.npz")
+    assert "no friction from this log: it has no forces" in run("check", log)[1]
+    assert "it has no forces" in json.loads(run("check", log, "--json")[1])["without_friction"]
+    assert json.loads(run("check", felt, "--json")[1])["without_friction"] is None
     assert "share of the resultant by the data: x 100%, y 100%, z 100%" in run("check", log, "--gel", gel)[1]
     with_forces, without = (json.loads(run("detect", log, "--json", *more)[1]) for more in (("--gel", gel), ()))
     assert with_forces["frames_in_contact"] == without["frames_in_contact"] > 0

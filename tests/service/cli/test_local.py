@@ -105,6 +105,7 @@ def test_what_was_detected_is_told_with_units() -> None:
         ("computed in", "0.250 s"),
         ("unknown", None),
     ]
+    assert dict(local._detection_lines(seen() | {"marker_noise": math.nan}))["marker noise"] is None  # of forces alone
     nothing = dict(local._detection_lines(seen(ratio=(math.nan,) * 3)))
     assert nothing["stick ratio"] is None
     whole = dict(local._detection_lines(seen(ratio=(0.0, 0.0, 0.0))))
