@@ -1,4 +1,4 @@
-"""Root of the covariance of data, which are noise of variance 1 and what unknowns of variance 1 make of them.
+"""Roots of covariances where data are noise of variance 1 and what unknowns of variance 1 make of them.
 
 By routines that leave other threads the interpreter: a live stream's frames go on while its contact is sought.
 """
@@ -21,18 +21,41 @@ def covariance_root(spread: FloatArray) -> FloatArray:
     By QR of the unit matrix on top of Sᵀ (Golub and Van Loan, Matrix Computations, 4th ed., §6.5.3): the sum itself
     would have the square of R's condition number, and lose what is small beside its largest eigenvalue.
     """
-    m, p = spread.shape
-    block = min(32, m)  # columns at a time; of all sizes about as fast
-    root, below = np.eye(m, order="F"), np.array(spread.T, dtype=np.float64, order="F")
-    reflectors, work = np.empty((block, m), order="F"), np.empty(block * m)
-    sizes = [byref(c_int(size)) for size in (p, m, 0, block)]
-    arrays = [(root, m), (below, max(p, 1)), (reflectors, block)]
-    info = c_int()
-    _dtpqrt(*sizes, *(each for array, rows in arrays for each in (array.ctypes.data, byref(c_int(rows)))),
-            work.ctypes.data, byref(info))  # fmt: skip
-    return root
+    return _eliminated(spread.T)[0]
+
+
+def posterior(response: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of unknowns [p] by data [m] that a ``response`` A [m, p] makes of them: a root [p, p], upper triangular, of their
+    covariance (1 + AᵀA)⁻¹, and the operator (1 + AᵀA)⁻¹ Aᵀ [p, m] from data to their mean.
+
+    By QR of the unit matrix on top of A: the root is R⁻¹ = Q_1, and the operator Q_1 Q_2ᵀ. Reflectors that begin with
+    the unit matrix, as [1; V], have the product 1 - [1; V] T [1; V]ᵀ, where T⁻¹ is the upper triangle of 1 + VᵀV with
+    half of its diagonal (Joffrain et al., Accumulating Householder transformations, revisited, ACM TOMS 32, 2006):
+    Q is as orthogonal as if they were applied, at half of the cost.
+    """
+    _, below = _eliminated(response)
+    unit = np.eye(below.shape[1])
+    inner = below.T @ below + unit
+    np.fill_diagonal(inner, 0.5 * np.diag(inner))
+    factor = np.triu(lapack.dtrtri(inner)[0])
+    root = unit - factor
+    return root, -root @ (below @ factor).T
 
 
 def solve_root(root: FloatArray, data: FloatArray, *, transposed: bool = False) -> FloatArray:
     """R⁻¹ D of data D [m, n], or (Rᵀ)⁻¹ D."""
     return np.asarray(lapack.dtrtrs(root, data, trans=int(transposed))[0])
+
+
+def _eliminated(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """R [p, p] by QR of the unit matrix on top of a ``matrix`` [m, p], and V [m, p] of the reflectors [1; V]."""
+    m, p = matrix.shape
+    block = min(32, p)  # columns at a time; of all sizes about as fast
+    root, below = np.eye(p, order="F"), np.array(matrix, dtype=np.float64, order="F")
+    reflectors, work = np.empty((block, p), order="F"), np.empty(block * p)
+    sizes = [byref(c_int(size)) for size in (m, p, 0, block)]
+    arrays = [(root, p), (below, max(m, 1)), (reflectors, block)]
+    info = c_int()
+    _dtpqrt(*sizes, *(each for array, rows in arrays for each in (array.ctypes.data, byref(c_int(rows)))),
+            work.ctypes.data, byref(info))  # fmt: skip
+    return root, below

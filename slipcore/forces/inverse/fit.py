@@ -7,7 +7,7 @@ import numpy as np
 import scipy.linalg
 
 from slipcore.forces.defaults import FIT
-from slipcore.forces.inverse.covariance import solve_root
+from slipcore.forces.inverse.covariance import posterior
 from slipcore.forces.inverse.prior import Smoothness, choices, factors, usual
 from slipcore.forces.inverse.strength import Criterion, Spectrum
 from slipcore.forces.operator.nodes import Nodes
@@ -132,13 +132,8 @@ def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: 
     """The posterior on a ``support`` [k] under a known prior."""
     q, r = observation.on(support)
     root = prior.strength * factors_on(nodes, support, prior.smoothness)
-    j = root.shape[1]
-    stacked = np.concatenate((times(r, root), np.eye(3 * j)))
-    inner, outer = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
-    whitened = solve_root(np.asarray(outer, dtype=np.float64), np.column_stack((np.eye(3 * j), inner[: len(r)].T)))
-    whitened = np.concatenate([part @ rows for part, rows in zip(root, np.split(whitened, 3), strict=True)])
-    operator = whitened[:, 3 * j :] @ q.T / observation.noise
-    return TractionFit(support, operator, whitened[:, : 3 * j], root)
+    of_covariance, to_mean = (_unwhitened(root, part) for part in posterior(times(r, root)))
+    return TractionFit(support, to_mean @ q.T / observation.noise, of_covariance, root)
 
 
 def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -212,6 +207,11 @@ def factors_on(nodes: Nodes, support: BoolArray, shape: Smoothness) -> FloatArra
 def times(r: FloatArray, root: FloatArray) -> FloatArray:
     """R [r, 3, j] times a block-diagonal factor [3, j, j], as [r, 3 j]."""
     return np.concatenate([r[:, axis] @ root[axis] for axis in range(3)], axis=1)
+
+
+def _unwhitened(root: FloatArray, rows: FloatArray) -> FloatArray:
+    """A block-diagonal factor [3, j, j] times ``rows`` [3 j, n] of its coefficients."""
+    return np.concatenate([part @ each for part, each in zip(root, np.split(rows, 3), strict=True)])
 
 
 def _push(pressure: FloatArray, mean: FloatArray) -> FloatArray:
