@@ -3,6 +3,7 @@
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from db import identity
@@ -37,8 +38,9 @@ class StoreConfig:
     scatter_from_other_materials: bool = True
 
 
+@cache
 def warm_up() -> None:
-    """Import and try all that a first job would wait for."""
+    """Import and try all that a first job would wait for, once in a process and in those that are forked from it."""
     import estimators
     import slipcore
     from service.jobs import pipeline

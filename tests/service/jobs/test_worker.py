@@ -85,5 +85,6 @@ def test_what_another_runner_has_taken_over_is_left_to_it(
 
 
 def test_warming_up_tries_what_a_job_needs(caplog: pytest.LogCaptureFixture) -> None:
+    worker.warm_up.cache_clear()
     worker.warm_up()
     assert caplog.records == []
