@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from estimators.defaults import ALARM, CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.grasp_statistics import GraspStatistics
+from estimators.linear.log_sum import log_sum
 from estimators.linear.priors import WEAK, ScatterPrior
 
 FloatArray = NDArray[np.float64]
@@ -180,4 +180,4 @@ def _log_evidence(level: FloatArray, variance: FloatArray, shift: float, scatter
     gain = 0.5 * (deviation**2 / precision - np.log(precision * shift**2))
     prior = scatter_prior.log_density(TAUS) + np.log(TAUS)
     null = prior[:, None] + unchanged
-    return np.asarray(special.logsumexp(null + gain, axis=0) - special.logsumexp(null))
+    return np.asarray(log_sum(null + gain, axis=0) - log_sum(null))

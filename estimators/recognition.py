@@ -13,6 +13,7 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
 from estimators.linear.least_squares import whole_triangle
+from estimators.linear.log_sum import log_sum
 from estimators.linear.place_errors import error_of_places
 from estimators.linear.unknown_velocity import offset_variance
 
@@ -100,7 +101,7 @@ def _integral(log_density: LogDensity, low: FloatArray, high: FloatArray) -> Flo
         first, last = np.argmax(matters, axis=-1), np.argmax(matters[..., ::-1], axis=-1)
         step = (high - low) / (RECOGNITION.scatter_nodes - 1)
         low, high = low + step * np.maximum(first - 1, 0), high - step * np.maximum(last - 1, 0)
-    return np.asarray(special.logsumexp(log, axis=-1) + np.log(step))
+    return np.asarray(log_sum(log, axis=-1) + np.log(step))
 
 
 def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] | None) -> dict[str, float]:
@@ -117,7 +118,7 @@ def _of_material(data: FitData, places: FloatArray, model: FrictionModel) -> flo
     triangle[:, :3] *= size
     shared = _shared(data, places / np.outer(size, size), model)
     found = log_predictive(triangle, data.effective_n, model.coefficients, shared, _known(*_scatter(model)))
-    return float(special.logsumexp(found) - np.log(len(found)))
+    return float(log_sum(found) - np.log(len(found)))
 
 
 def _known(scale: float, freedom: float, spread: float = RECOGNITION.scatter_spread) -> LogDensity:
@@ -184,4 +185,4 @@ def _of_unknown(data: FitData) -> float:
     found = log_predictive(
         whole_triangle(data.factor).astype(float), data.effective_n, mean, covariance, _of_the_population
     )
-    return float(special.logsumexp(found) - np.log(len(found)))
+    return float(log_sum(found) - np.log(len(found)))

@@ -11,6 +11,7 @@ from scipy import special
 from estimators.defaults import GRID
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierarchical
+from estimators.linear.log_sum import log_sum
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
 from estimators.linear.sensor_gains import Gains
@@ -123,7 +124,7 @@ def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGri
     sigma = np.exp(log_sigma)
     scatter = np.stack([sigma, *(sigma * np.exp(0.5 * axis) for axis in scales[1:])], axis=1)
     marginal = np.full([len(axis) for axis in axes], -np.inf)
-    marginal.flat[matters] = special.logsumexp(log, axis=1)
+    marginal.flat[matters] = log_sum(log, axis=1)
     cell = matters // (marginal.size // (count * count))
     gains = [Gains(model, products.of_sensor, cell, np.exp(log_nu), sigma, given) for log_nu in ratios[2:]]
     return PosteriorGrid(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from estimators.defaults import PROPOSAL, SAMPLING, WEIGHT_POWERS
+from estimators.linear.log_sum import log_sum
 
 FloatArray = NDArray[np.float64]
 Random = np.random.Generator | np.random.RandomState
@@ -40,7 +41,7 @@ class StudentMixture:
 
     def log_density(self, x: FloatArray) -> FloatArray:
         """Log density [k] at x [k, d], up to a constant."""
-        return np.asarray(special.logsumexp(self._logs(x)[0], axis=1)) if len(self.part) > 1 else self._logs(x)[0][:, 0]
+        return np.asarray(log_sum(self._logs(x)[0], axis=1)) if len(self.part) > 1 else self._logs(x)[0][:, 0]
 
     def fitted(self, x: FloatArray, weight: FloatArray) -> "StudentMixture":
         """The components moved to weighted points x [k, d]: one step of EM for a mixture (Cappé et al., 2008).
