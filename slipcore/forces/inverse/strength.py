@@ -40,39 +40,41 @@ class Spectrum:
         if criterion not in CRITERIA:
             raise InvalidInput("criterion", criterion, ", ".join(CRITERIA))
 
-        def price(log_strength: float) -> float:
-            return CRITERIA[criterion](self.s, self.y, rest, count, float(np.exp(log_strength)))
+        def price(log_strength: FloatArray) -> FloatArray:
+            return CRITERIA[criterion](self.s, self.y, rest, count, np.exp(log_strength)[..., None])
 
         least = min(STRENGTH.least_signal / self.s[0], STRENGTH.least_share * STRENGTH.largest)
         grid = np.linspace(np.log(least), np.log(STRENGTH.largest), STRENGTH.grid)
-        best = int(np.argmin([price(at) for at in grid]))
+        best = int(np.argmin(price(grid)))
         around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
-        return float(np.exp(minimize_scalar(price, bounds=around, method="bounded").x))
+        found = minimize_scalar(lambda at: float(price(np.asarray(at))), bounds=around, method="bounded")
+        return float(np.exp(found.x))
 
     def log_evidence(self, strength: float) -> float:
         """Log probability of the data, without what no choice changes."""
-        return -_evidence(self.s, self.y, 0.0, len(self.y), strength)
+        return -float(_evidence(self.s, self.y, 0.0, len(self.y), np.array([strength])))
 
 
-def _evidence(s: FloatArray, y: FloatArray, rest: float, _count: int, strength: float) -> float:
+def _evidence(s: FloatArray, y: FloatArray, rest: float, _count: int, strength: FloatArray) -> FloatArray:
     spread = 1.0 + (strength * s) ** 2
-    return 0.5 * float(np.sum(y**2 / spread) + np.sum(np.log(spread)) + rest)
+    return np.asarray(0.5 * (np.sum(y**2 / spread + np.log(spread), axis=-1) + rest))
 
 
-def _gcv(s: FloatArray, y: FloatArray, rest: float, count: int, strength: float) -> float:
+def _gcv(s: FloatArray, y: FloatArray, rest: float, count: int, strength: FloatArray) -> FloatArray:
     left = 1.0 / (1.0 + (strength * s) ** 2)
-    return float(np.log(np.sum((left * y) ** 2) + rest) - 2.0 * np.log(count - len(y) + left.sum()))
+    residual = np.sum((left * y) ** 2, axis=-1) + rest
+    return np.asarray(np.log(residual) - 2.0 * np.log(count - len(y) + left.sum(axis=-1)))
 
 
-def _discrepancy(s: FloatArray, y: FloatArray, rest: float, count: int, strength: float) -> float:
+def _discrepancy(s: FloatArray, y: FloatArray, rest: float, count: int, strength: FloatArray) -> FloatArray:
     left = 1.0 / (1.0 + (strength * s) ** 2)
-    return float(np.abs(np.log((np.sum((left * y) ** 2) + rest) / count)))
+    return np.asarray(np.abs(np.log((np.sum((left * y) ** 2, axis=-1) + rest) / count)))
 
 
-CRITERIA: dict[str, Callable[[FloatArray, FloatArray, float, int, float], float]] = {
+CRITERIA: dict[str, Callable[[FloatArray, FloatArray, float, int, FloatArray], FloatArray]] = {
     "evidence": _evidence,
     "gcv": _gcv,
     "discrepancy": _discrepancy,
 }
 """What the strength of a prior minimises: minus the log marginal likelihood; generalised cross-validation; how far the
-residual is from the noise (Morozov)."""
+residual is from the noise (Morozov); for each ``strength`` [..., 1], as [...]."""
