@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from slipcore.forces.defaults import PRIOR
 from slipcore.frames import FloatArray
@@ -46,7 +47,7 @@ def factors(places: FloatArray, pitch: float, smoothness: Smoothness, rim: Float
     """
     around = places[:0] if rim is None else rim
     known, whole = len(around), np.concatenate((around, places))
-    apart = np.hypot(*(whole[:, None] - whole[None]).transpose(2, 0, 1)) / pitch
+    apart = cdist(whole, whole) / pitch
     traction = smoothness.shear * _factor(apart[known:, known:] / smoothness.traction)
     pressure = _factor(apart / smoothness.pressure)[known:, known:]
     if known:
