@@ -1,6 +1,7 @@
 """Which problem each error is answered by: those of the use cases, of the stores and of the framework."""
 
 import asyncio
+import json
 import logging
 import re
 from collections.abc import Mapping
@@ -202,7 +203,14 @@ def _wrong_value(entry: dict[str, Any]) -> Problem:
     name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
     if entry["type"] == "missing":
         return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
-    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], _allowed(entry))
+    return Problem.wrong_value(INVALID_REQUEST, name, _given(entry), _allowed(entry))
+
+
+def _given(entry: dict[str, Any]) -> object:
+    """The value; of a wrong kind, in a body, as JSON has it: "2" is text, and looks like a number without its marks."""
+    value = entry["input"]
+    is_of_wrong_kind = entry["type"].endswith(("_type", "_parsing")) and entry["loc"][0] == "body"
+    return json.dumps(value, ensure_ascii=False) if is_of_wrong_kind and isinstance(value, str | bool | None) else value
 
 
 def _allowed(entry: dict[str, Any]) -> str:

@@ -128,3 +128,19 @@ def test_what_is_allowed_is_said_in_words_of_ours(
 ) -> None:
     entry = {"type": kind, "loc": ("body", "name"), "input": value, "ctx": ctx, "msg": msg}
     assert _wrong_value(entry).allowed == allowed
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "value", "shown"),
+    [
+        ("float_type", "body", "2", '"2"'),
+        ("float_type", "body", True, "true"),
+        ("string_type", "body", None, "null"),
+        ("float_parsing", "query", "fast", "fast"),
+        ("greater_than", "body", -1, "-1"),
+        ("string_too_short", "body", "", ""),
+    ],
+)
+def test_a_value_of_the_wrong_kind_is_shown_as_json_has_it(kind: str, place: str, value: object, shown: str) -> None:
+    entry = {"type": kind, "loc": (place, "load"), "input": value, "ctx": {"min_length": 1}, "msg": "Input should be 1"}
+    assert _wrong_value(entry).value == shown
