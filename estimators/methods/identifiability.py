@@ -11,15 +11,15 @@ FloatArray = NDArray[np.float64]
 
 ONE_RECORD_ADVICE = (
     "all samples are of one grasp at one place, in which an error that lasts looks like an effect of velocity or of "
-    "normal force: to know beta1 and beta2 record several grasps, or more places at once"
+    "normal force: to know β₁ and β₂ record several grasps, or more places at once"
 )
 FEW_PLACES_ADVICE = (
-    "all samples are of one grasp, at places too few to show what errors that last in each of them do to beta1 and "
-    "beta2: to know these record several grasps, or more places at once"
+    "all samples are of one grasp, at places too few to show what errors that last in each of them do to β₁ and "
+    "β₂: to know these record several grasps, or more places at once"
 )
 INDEPENDENT_ADVICE = (
-    "all samples are of one grasp, whose errors may last, and this method takes them as independent, so that beta1 and "
-    "beta2 may be off by more than their intervals: fit by auto, or ols to the samples themselves"
+    "all samples are of one grasp, whose errors may last, and this method takes them as independent, so that β₁ and "
+    "β₂ may be off by more than their intervals: fit by auto, or ols to the samples themselves"
 )
 
 

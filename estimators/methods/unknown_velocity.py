@@ -55,5 +55,5 @@ def slope_inflation(data: FitData, linear: LinearFit) -> float:
 def in_words(data: FitData) -> str:
     """Which velocities are unknown, and what follows."""
     if data.unknown_velocity > 1.0 - ROUNDING:
-        return "the object's motion is unknown, so that no velocity is and the samples do not determine beta1"
-    return f"the object's motion is unknown to {data.unknown_velocity:.0%} of the samples: the others determine beta1"
+        return "the object's motion is unknown, so that no velocity is and the samples do not determine β₁"
+    return f"the object's motion is unknown to {data.unknown_velocity:.0%} of the samples: the others determine β₁"

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -49,6 +50,18 @@ def test_a_material_shows_friction_where_it_has_a_model_and_says_where_it_has_no
     page = browser.get("/materials/paper").text
     assert "<dt>Friction coefficient μ</dt><dd>0.400</dd>" in page  # β₀ of the stored model
     assert "There is no model yet." in browser.get("/materials/cardboard").text
+
+
+@pytest.mark.usefixtures("store")
+def test_a_material_shows_why_its_method_was_taken(browser: Any, database: Database, new_model: NewModel) -> None:
+    because = "without the 48 beyond 3 deviations"
+    with database.write() as session:
+        material = materials.create(session, "felt", "").id
+        job = jobs.add(session, "fit", "ols", material_id=material)
+        told = replace(new_model, diagnostics={**new_model.diagnostics, "chosen_because": because})
+        friction_models.add(session, material, job, told)
+    assert f"Method {new_model.method}: {because}." in browser.get("/materials/felt").text
+    assert "Method ols:" not in browser.get("/materials/paper").text
 
 
 def test_a_search_finds_parts_of_names_and_says_when_there_are_none(browser: Any, add: Callable[..., int]) -> None:
