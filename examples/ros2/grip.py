@@ -34,10 +34,10 @@ def settings_of(parameters: Mapping[str, float]) -> ControlSettings:
 
 def samples_of(told: Sequence[float]) -> SlipSamples | None:
     """Samples of slip from their message: of all elements told to slip the share that moves, 0 to 1, then of each that
-    does its friction coefficient and normal force, N. None where there are none, or what cannot be.
+    does its friction coefficient and normal force, N; 0 alone where none does. None for what cannot be.
     """
     numbers = np.asarray(told, dtype=np.float64)
-    whole = numbers.size >= 3 and numbers.size % 2 == 1
+    whole = numbers.size % 2 == 1 and (numbers[0] == 0.0) == (numbers.size == 1)
     if not whole or not ((numbers >= 0.0) & (numbers < math.inf)).all() or numbers[0] > 1.0:
         return None
     friction, normal = numbers[1:].reshape(-1, 2).T

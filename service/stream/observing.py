@@ -73,7 +73,7 @@ class Observer:
         pressed = forces.pressing > max(LEAST_SHARE * forces.pressing.max(), of.least)
         slips &= pressed
         use = slips & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
-        if not use.any():
+        if not slips.any():
             return None
         moving = float(use.sum() / slips.sum())
         return SlipSamples(forces.tangential[use] / forces.pressing[use], forces.pressing[use], moving)

@@ -12,6 +12,7 @@ import pytest
 from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
 from stiction_client import (
     Contact,
+    ControllerState,
     ControlSettings,
     FrictionModel,
     GraspController,
@@ -111,6 +112,41 @@ def test_what_rests_and_is_told_to_slip_does_not_stop_the_force_from_falling(mov
         normal = command.normal_force
     assert normal > 4.5 if moving == 1.0 else normal < 1.5
     assert (state.learned.sampled == ()) == (moving < 1.0)
+
+
+NONE_MOVES = SlipSamples(np.zeros(0), np.zeros(0), 0.0)
+
+
+def relaxed(state: ControllerState, samples: SlipSamples | None, before: float = 1.0) -> float:
+    """The force on 1 N at rest, from 5 N on, of which most is told to slip; ``before``: the stick ratio as it grew."""
+    normal = 5.0
+    for frame in range(1, 300):
+        load, ratio = (0.1 * frame, before) if frame <= 10 else (1.0, 1.0 if frame < 30 else 0.3)
+        seen = Observation(frame * FRAME, normal, load, 0.0, ratio, samples if ratio == 0.3 else None)
+        state, command = GraspController.step(state, seen)
+        normal = command.normal_force
+    return normal
+
+
+def test_slip_that_is_told_and_does_not_move_does_not_stop_the_force_from_falling() -> None:
+    """A ring that slips moves as the force falls."""
+    assert relaxed(GraspController.init(SETTINGS), NONE_MOVES) < 1.5
+    assert relaxed(GraspController.init(SETTINGS), None) > 4.0
+
+
+def test_friction_that_was_shown_before_the_load_rested_stops_it() -> None:
+    assert relaxed(GraspController.init(SETTINGS), NONE_MOVES, before=0.3) > 4.0
+
+
+def test_told_slip_is_not_doubted_where_something_is_known_or_after_an_alarm(make_model: Make) -> None:
+    model = model_of(make_model, 0.25)
+    unsure = GraspController.init(SETTINGS)
+    assert unsure.doubts
+    assert not GraspController.init(SETTINGS, model).doubts
+    assert not GraspController.init(SETTINGS, materials={"rubber": model}).doubts
+    alarmed, _ = GraspController.step(dataclasses.replace(unsure, mode="alarm"), Observation(FRAME, 1.0, 0.1, 0.0, 1.0))
+    assert not alarmed.doubts
+    assert relaxed(dataclasses.replace(unsure, doubts=False), NONE_MOVES) > 4.0
 
 
 def test_a_load_that_comes_back_is_gripped_for_the_friction_that_bore_one_before() -> None:

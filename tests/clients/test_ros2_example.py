@@ -82,7 +82,9 @@ def test_samples_of_slip_are_read_off_their_message() -> None:
     assert told.friction_coefficient.tolist() == [0.3, 0.4]
     assert told.normal_force.tolist() == [0.05, 0.06]
     assert told.moving == 0.5
-    for none in ([], [1.0], [1.0, 0.3], [1.0, math.nan, 0.05], [1.0, 0.3, -0.05], [1.1, 0.3, 0.05]):
+    still = EXAMPLE.samples_of([0.0])
+    assert (still.friction_coefficient.size, still.moving) == (0, 0.0)
+    for none in ([], [1.0], [0.0, 0.3, 0.05], [1.0, 0.3], [1.0, math.nan, 0.05], [1.0, 0.3, -0.05], [1.1, 0.3, 0.05]):
         assert EXAMPLE.samples_of(none) is None
 
 

@@ -22,6 +22,8 @@ class ControllerState:
     ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: friction of slipping elements;
     ``contradictions``: frames in a row that speak against ``known``; ``overloaded``: frames in a row with as much load
     as all of the contact can bear by it; ``since``: when ``mode`` began, s;
+    ``doubts``: whether slip that is told may be none: while nothing is known of the object, and no alarm was raised;
+    ``still``: frames in which elements were told to slip as the grip is relaxed, and hardly any moved;
     ``rested``: whether a load has come to rest, until which the first touch lasts; ``relaxation``: what a
     grip that is being relaxed bears; ``recognition``: the materials that it may be of; ``material``: which it was
     taken for, and its ``probability``.
@@ -38,6 +40,8 @@ class ControllerState:
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
     overloaded: int = 0
+    doubts: bool = False
+    still: int = 0
     rested: bool = False
     relaxation: Relaxation = field(default_factory=Relaxation)
     recognition: GripRecognition | None = None
@@ -67,7 +71,9 @@ def init(
             settings, KnownFriction.of_model(model, settings), "hold", _floor(settings, rested=False)
         )
     among = GripRecognition.among(materials or {}, settings)
-    return ControllerState(settings, None, "feel", _floor(settings, rested=False), recognition=among)
+    return ControllerState(
+        settings, None, "feel", _floor(settings, rested=False), doubts=among is None, recognition=among
+    )
 
 
 def step(state: ControllerState, observation: Observation) -> tuple[ControllerState, Command]:
@@ -120,6 +126,8 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
         recognition=recognition,
         contradictions=contradictions,
         overloaded=overloaded,
+        doubts=state.doubts and state.mode != "alarm",
+        still=_still(state, observation),
         rested=state.rested or load.settled(observation.time, state.settings),
         relaxation=state.relaxation.step(load, observation.normal, relaxed=state.mode == "learn"),
     )
@@ -154,6 +162,25 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
     """
     warns = agrees and _has_model(state) and not _relaxed(state)
     return warns or samples.moving >= state.settings.moving_share
+
+
+def _still(state: ControllerState, observation: Observation) -> int:
+    """Frames so far in which elements were told to slip as the grip is relaxed, and hardly any moved."""
+    samples = observation.slip_samples
+    if state.mode != "learn" or (samples is not None and samples.moving >= state.settings.moving_share):
+        return 0
+    return state.still + (samples is not None)
+
+
+def _doubtful(state: ControllerState) -> tuple[StickRatioEstimate, float]:
+    """What the stick ratio says, and the least friction, as the grip of an object of which nothing is known is relaxed.
+
+    A ring that slips moves as the force falls: while nothing does, slip that is told is none. Samples that agree show
+    the friction of a ring that is narrower than told.
+    """
+    settings, sticking = state.settings, state.sticking
+    still, agreed = state.still >= settings.learn_frames, state.learned.agrees(settings.contradiction_frames, settings)
+    return sticking.confirmed() if still else sticking, _shown(state) if agreed else sticking.least(settings)
 
 
 def _covers_ring(samples: SlipSamples, observation: Observation, settings: ControlSettings) -> bool:
@@ -319,7 +346,9 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     waits = among is not None and among.waits(state.time, settings) and state.mode == "feel"
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
     least = state.sticking.least(settings)
-    demands.append(_Demand(state.sticking.required(load, target, least), "stick ratio"))
+    doubtful = state.doubts and state.mode == "learn"
+    sticking, shown = _doubtful(state) if doubtful else (state.sticking, least)
+    demands.append(_Demand(sticking.required(load, target, shown), "stick ratio"))
     lowest = state.learned.lowest(settings)
     if state.mode == "learn" and lowest > 0.0:
         friction = max(lowest, least)  # what sticks, taken for slip, would ask for ever more

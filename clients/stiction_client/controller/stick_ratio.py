@@ -1,7 +1,7 @@
 """Grip by the stick ratio alone: what it says of friction before any model does."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from stiction_client.controller.friction import utilisation
 from stiction_client.controller.load import LoadEstimate
@@ -17,7 +17,8 @@ class StickRatioEstimate:
     ``slipping``: frames in a row in which next to nothing stuck; ``bore``: the largest load over force that the contact
     bore, which its friction is no less than; ``highest``: the same of the ``load``, N, a mean, that is at rest now:
     while it is pressed harder, all of it sticks (Mindlin and Deresiewicz, 1953), and a detector may go on seeing what
-    slipped before. Then the stick ratio ``shows`` nothing.
+    slipped before. Then the stick ratio ``shows`` nothing. ``before_rest``: the friction that it showed
+    before the load came to rest.
     """
 
     time: float = -math.inf
@@ -28,6 +29,7 @@ class StickRatioEstimate:
     highest: float = 0.0
     load: float = 0.0
     shows: bool = True
+    before_rest: float = math.nan
 
     def step(self, observation: Observation, load: LoadEstimate, settings: ControlSettings) -> "StickRatioEstimate":
         """The same after a frame under a ``load``.
@@ -44,7 +46,12 @@ class StickRatioEstimate:
             bore = bears if self.slips(settings) else max(self.bore, bears - load.noise / observation.normal)
         slipping = self.slipping + 1 if ratio <= settings.reflex_stick_ratio else 0
         time = self.time if math.isnan(ratio) else observation.time
-        return StickRatioEstimate(time, ratio, friction, slipping, bore, highest, mean, shows)
+        before_rest = self.before_rest if math.isfinite(load.steady) else friction
+        return StickRatioEstimate(time, ratio, friction, slipping, bore, highest, mean, shows, before_rest)
+
+    def confirmed(self) -> "StickRatioEstimate":
+        """With no less friction than was shown before the load came to rest: none where none was shown."""
+        return self if self.friction > self.before_rest else replace(self, friction=self.before_rest)
 
     def _borne(self, normal: float, load: LoadEstimate, settings: ControlSettings) -> tuple[float, float, float, bool]:
         """The ``load``, of one at rest the mean, what it is of the force, and with it ``highest`` and ``shows``."""

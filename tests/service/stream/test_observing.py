@@ -86,7 +86,8 @@ def test_what_is_slower_than_noise_is_not_sampled_and_tells_how_much_moves() -> 
     found = sampled(TOUCH, [[LEAST_SPEED, 1.01 * LEAST_SPEED, 1.0, 1.0]])
     np.testing.assert_allclose(found.normal_force, [2.0])
     assert found.moving == 0.5
-    assert sampled(TOUCH, LEAST_SPEED) is None
+    none = sampled(TOUCH, LEAST_SPEED)
+    assert (none.normal_force.size, none.moving) == (0, 0.0)
     assert sampled(NO, 1.0) is None
 
 
@@ -94,11 +95,12 @@ def test_the_speed_that_counts_is_the_mean_of_the_last_frames() -> None:
     observer = Observer(PLACE)
     for k in range(WINDOW + 1):
         observer, seen = observer.step(frame(), state(TOUCH, 7.0 * WINDOW * LEAST_SPEED if k == 0 else 0.0))
-        assert seen.slip_samples is None if k != WINDOW - 1 else seen.slip_samples is not None
+        assert (seen.slip_samples is not None and seen.slip_samples.moving > 0.0) == (k == WINDOW - 1)
     back_and_forth = Observer(PLACE)
     for k in range(WINDOW):
         back_and_forth, seen = back_and_forth.step(frame(), state(TOUCH, 1.0 if k % 2 else -1.0))
-    assert seen.slip_samples is None
+    assert seen.slip_samples is not None
+    assert seen.slip_samples.moving == 0.0
 
 
 def test_an_element_whose_velocity_is_unknown_is_not_sampled() -> None:
