@@ -694,8 +694,14 @@ class ForcesOnlyOptions(ContactOptions):
 class CoarseOptions(ForcesOnlyOptions):
     """Method ``coarse``: those of ``forces_only``, and what it is joined with method ``filter`` and with layers by."""
 
-    filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.5")] = 0.4
-    """Weight of the log-odds of method ``filter`` beside those of the forces."""
+    forces_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.005 from 0.4 to 0.7")] = 0.5
+    """Weight of the log-odds of method ``forces_only``."""
+    filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.35")] = 0.3
+    """Weight of the log-odds of method ``filter``."""
+    few_odds: Annotated[float, Option(0.0, 10.0, "log-odds", "tuning scenes; 1: false slip of .055 on 3 × 3")] = 0.6
+    """What is added to the log-odds of slip where very few elements touch, and taken off where more do."""
+    few_elements: Annotated[float, Option(1.0, 1e9, "-", "tuning scenes: the same within .01 from 6.5 to 10")] = 7.0
+    """How many elements have to touch for neither."""
     many_elements: Annotated[float, Option(1.0, 1e9, "-", "tuning scenes: the same within .003 from 30 to 60")] = 45.0
     """How many elements have to touch for forces and layers to count half as much as on few; beyond, ever less."""
     largest_sum: Annotated[float, Option(1.0, 30.0, "log-odds", "tuning scenes")] = 9.0

@@ -46,6 +46,7 @@ ENTRIES = {
         "force_floor heading_length ratio_motion",
         "0 but of reconstructed forces, which the page's logs do not have; of motion not measured there yet",
     ),
+    "coarse": ("few_elements few_odds filter_weight forces_weight", "not measured there yet"),
     "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (

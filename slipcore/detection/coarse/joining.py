@@ -42,21 +42,25 @@ def join(frame: Evidence, layers: Layers, considered: Considered, after: Layers,
     kept.odds[:] = before.odds
     look_at_layers(pressed_elements(seen), kept, known)
     tuning = layer_tuning(known.settings)
-    few = share_of_forces(int(np.count_nonzero(seen.contact)), tuning.many_elements)
+    touching = int(np.count_nonzero(seen.contact))
+    few = share_of_few(touching, tuning.many_elements)
     by_place = few * tuning.filter_weight + 1.0 - few
+    beforehand = few * tuning.few_odds * (2.0 * share_of_few(touching, tuning.few_elements) - 1.0)
     n, m = seen.contact.shape
     for i in range(n):
         for j in range(m):
-            odds = few * log_odds(seen.by_forces[i, j], tuning.largest_sum)
+            odds = beforehand + few * tuning.forces_weight * log_odds(seen.by_forces[i, j], tuning.largest_sum)
             odds += by_place * log_odds(seen.by_filter[i, j], tuning.largest_sum)
             odds += few * tuning.layers_weight * kept.odds[i * m + j] if seen.stay[i, j] else 0.0
             decided.slip[i, j], decided.probability[i, j] = odds > 0.0, 1.0 / (1.0 + math.exp(-odds))
 
 
 @compiled
-def share_of_forces(touching: int, many: float) -> float:
-    """How much of what forces and layers say counts beside so many elements that touch, a half at ``many``: the smaller
-    elements are beside the contact, the more surely place and force ratio of each tell whether it slips.
+def share_of_few(touching: int, many: float) -> float:
+    """How much of what is so of few elements counts where so many touch: a half at ``many``.
+
+    The smaller elements are beside the contact, the more surely place and force ratio of each tell whether it slips;
+    and of very few none takes less of a load than another before all slide, so that forces speak for stick too long.
     """
     return 1.0 / (1.0 + (touching / many) ** 4)
 

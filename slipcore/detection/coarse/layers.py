@@ -79,9 +79,12 @@ class LayerTuning(NamedTuple):
     layer_stick_width: float
     spring_spread: float
     largest_sum: float
+    forces_weight: float
     filter_weight: float
     layers_weight: float
     many_elements: float
+    few_odds: float
+    few_elements: float
 
 
 _TUNING = len(LayerTuning._fields)
@@ -196,15 +199,15 @@ def halve(load: FloatArray, level: FloatArray, traction: FloatArray) -> None:
 def spread_of_stiffness(normal: FloatArray, depth: FloatArray) -> float:
     """How far normal forces are from being one stiffness times depth, as a share of their root mean square.
 
-    Of elements of one gel they are far, for each is pressed in by its neighbours' forces, too; pillars are springs by
-    themselves, which slip as a whole.
+    Of elements of one gel they are far, for each is pressed in by its neighbours' forces, too, also one that bears
+    nothing itself; pillars are springs by themselves, which slip as a whole. Where all that touch bear the same, as
+    four around the middle of a contact, only those beside them show which it is.
     """
     forces = depths = both = 0.0
     for i in range(len(normal)):
-        if normal[i] > 0.0:
-            forces += normal[i] * normal[i]
-            depths += depth[i] * depth[i]
-            both += normal[i] * depth[i]
+        forces += normal[i] * normal[i]
+        depths += depth[i] * depth[i]
+        both += normal[i] * depth[i]
     if depths <= _LEAST_SPREAD:
         return 0.0
     return math.sqrt(max(1.0 - both / forces * both / depths, 0.0))

@@ -39,7 +39,7 @@ def test_without_forces_it_is_the_filter_on_the_same_contact() -> None:
 
 def test_without_weight_it_is_the_forces_alone() -> None:
     log = observed(CASE.log, 5e-6, 1e-2, "force")
-    alone = detect_slip(log, "coarse", filter_weight=0.0, layers_weight=0.0, many_elements=1e9)
+    alone = detect_slip(log, "coarse", filter_weight=0.0, layers_weight=0.0, few_odds=0.0, many_elements=1e9)
     np.testing.assert_array_equal(alone.slip, detect_slip(log, "forces_only").slip)
 
 
@@ -55,9 +55,10 @@ def f1_of(log: GraspLog, **options: float) -> float:
     return count(true, detect_slip(log, "coarse", **options).slip & log.truth.contact).f1
 
 
-@pytest.mark.parametrize(("elements", "least"), [(3, 0.947), (6, 0.96)])  # without layers .943 and .951
+@pytest.mark.parametrize(("elements", "least"), [(3, 0.93), (6, 0.98)])  # without layers .896 and .942
 def test_layers_find_slip_of_a_gels_elements_that_are_as_large_as_the_contact(elements: int, least: float) -> None:
-    assert f1_of(sphere(elements, 0.8)) > least
+    log = sphere(elements, 0.8)
+    assert f1_of(log) > max(least, f1_of(log, layers_weight=0.0) + 0.03)
 
 
 @pytest.mark.parametrize("force_noise", [2e-3, 1e-2])

@@ -163,6 +163,14 @@ def test_springs_by_themselves_say_nothing_in_layers() -> None:
     np.testing.assert_allclose(layers.odds, 0.0, rtol=0.0, atol=1e-9)
 
 
+def test_of_four_elements_that_bear_the_same_those_beside_them_tell_a_gel_from_springs() -> None:
+    forces = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    springs = 1e-3 * forces
+    gel = springs + np.array([0.0, 0.0, 0.0, 0.0, 3e-4, 3e-4, 3e-4, 3e-4])
+    assert spread_of_stiffness(forces, springs) == 0.0
+    assert spread_of_stiffness(forces, gel) == pytest.approx(np.sqrt(1.0 - 4e-6 / (4.0 * 1.09e-6)))
+
+
 @pytest.mark.parametrize("normal", [0.0, 1e-12, 1e-6, 1.0, 1e4])
 def test_one_element_any_force_and_a_contact_that_ends_stay_finite(normal: float) -> None:
     layers, one = no_layers(len(PLACE), OPTIONS), np.zeros(len(PLACE))
