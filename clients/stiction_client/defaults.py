@@ -59,8 +59,8 @@ KNOWN_FRAMES = 10
 """-, 3 to 60: frames at rest from which on the mean of a load is known well enough to see what it lacks."""
 
 LEAST_NOISE = 0.005
-"""-, 0 to 0.05: of a load: what its noise counts as at least where a slide is looked for, a tenth of ``steady_share``:
-how little a load changes that is next to free of noise would else be a slide."""
+"""-, 0 to 0.05, in parts of the load: the least that its noise counts as where a slide is looked for, a tenth of
+``steady_share``: else the smallest change of a load next to free of noise would be a slide."""
 
 BORNE = 0.8
 """-, 0.5 to 1: of the largest load over force that a contact bore: what its friction is no less than, with the noise

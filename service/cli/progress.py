@@ -23,6 +23,9 @@ AGAIN = 0.05
 COMPILER = re.compile(r"[/\\](llvmlite|numba)[/\\]")
 """Whose code an exception may not pass: it is called from C++, which loses it or ends the process."""
 
+COMPILES = ", compiling numerics, which are kept"
+"""What a line says besides while kernels are compiled: it takes minutes, and only the first time."""
+
 Thing = TypeVar("Thing")
 
 
@@ -39,10 +42,10 @@ class Line:
         """Note which part is done, from 0 to 1, and what is being done by now."""
         self._part, self._doing = part, self._doing if doing is None else doing
 
-    def say(self) -> None:
-        """Write the line, where one is due."""
+    def say(self, besides: str = "") -> None:
+        """Write the line, where one is due, and what is to be said ``besides``."""
         seconds = perf_counter() - self._began
-        text = self._text(seconds)
+        text = self._text(seconds) + besides
         if self._is_rewritten:
             typer.echo(f"\r{text:<{len(self._said)}}", err=True, nl=False)
         elif seconds < self._next:
@@ -83,11 +86,11 @@ def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
 
     Gives whom to tell the part that is done (``Line.tell``), who raises ``KeyboardInterrupt`` where one was lost.
     """
-    done, line = threading.Event(), Line(doing)
+    done, line, caller = threading.Event(), Line(doing), threading.get_ident()
 
     def report() -> None:
         while not done.wait(MOMENT):
-            line.say()
+            line.say(COMPILES if _within_compiler(sys._current_frames().get(caller)) else "")
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
@@ -118,7 +121,7 @@ def _noted_interrupts() -> Iterator[Callable[[], None]]:
         nonlocal again
         came.set()
         again.cancel()
-        if any(COMPILER.search(each.f_code.co_filename) for each, _ in walk_stack(frame)):
+        if _within_compiler(frame):
             again = threading.Timer(AGAIN, os.kill, (os.getpid(), number))
             again.start()
         else:
@@ -141,6 +144,11 @@ def _noted_interrupts() -> Iterator[Callable[[], None]]:
     finally:
         if signal.getsignal(signal.SIGINT) is note:
             signal.signal(signal.SIGINT, before)
+
+
+def _within_compiler(frame: FrameType | None) -> bool:
+    """Whether a kernel is being compiled or loaded by the calls that led to a ``frame``."""
+    return frame is not None and any(COMPILER.search(each.f_code.co_filename) for each, _ in walk_stack(frame))
 
 
 def _rounded(seconds: float) -> str:

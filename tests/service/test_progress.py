@@ -44,6 +44,16 @@ def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
     assert err.endswith("\n")
 
 
+@pytest.mark.usefixtures("impatient")
+def test_it_is_said_that_kernels_are_being_compiled(capsys: pytest.CaptureFixture[str]) -> None:
+    with shown_progress("thinking"):
+        exec(compile("time.sleep(0.2)", "/lib/numba/core/dispatcher.py", "exec"), {"time": time})
+    assert "thinking: 0 s, compiling numerics, which are kept\n" in capsys.readouterr().err
+    with shown_progress("thinking"):
+        time.sleep(0.2)
+    assert "compiling" not in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("impatient", "on_a_terminal")
 def test_the_time_left_is_told_once_it_is_known_which_part_is_done(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
