@@ -12,6 +12,7 @@ from service.cli.exit_codes import CODE_OF_STATUS
 from service.cli.inputs import rest_of
 from service.cli.options import (
     DEFAULT_URL,
+    DETECTOR_HELP,
     FrameRate,
     GraspingSensor,
     Json,
@@ -45,6 +46,7 @@ def upload(
         str | None, typer.Option(help="Material that was held; without it slip is only detected.")
     ] = None,
     sensor: Annotated[str | None, typer.Option(help="That recorded, in place of the one that the logs name.")] = None,
+    detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     create: Annotated[bool, typer.Option("--create", help="Create the material if it isn't there.")] = False,
     wait: Annotated[bool, typer.Option(help="Wait for detection and fit.")] = True,
     scale: Scale = None,
@@ -63,10 +65,9 @@ def upload(
     with connected(url, key) as client:
         if create and material is not None:
             client.ensure_material(material)
+        asked = material, sensor, detector
         table = {"scale": scale, "frame_rate": frame_rate, "rest": rest}
-        results = list(
-            counted((_upload(client, each, wait, material, sensor, table) for each in sources), len(sources), "logs")
-        )
+        results = list(counted((_upload(client, each, wait, asked, table) for each in sources), len(sources), "logs"))
     if json:
         print_json({"uploads": results})
     else:
@@ -228,12 +229,12 @@ def _upload(
     client: "FrictionClient",
     source: Source,
     wait: bool,
-    material: str | None,
-    sensor: str | None,
+    asked: tuple[str | None, str | None, str | None],
     table: dict[str, Any],
 ) -> dict[str, Any]:
-    """Upload one log, with what a ``table`` of it needs unless it was read here; that it is not read or that the
-    service does not take it is a result like any other.
+    """Upload one log: ``asked`` are its material, sensor and detector; a ``table`` that was not read here needs more.
+
+    That it is not read or that the service does not take it is a result like any other.
     """
     from slipcore import InvalidInput
     from stiction_client import ProblemError, problems
@@ -241,7 +242,7 @@ def _upload(
     try:
         log, mapping = source.log()
         options = table if isinstance(log, Path) else {}
-        receipt = client.upload(log, material, sensor, mapping=mapping, **options)
+        receipt = client.upload(log, *asked, mapping=mapping, **options)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:

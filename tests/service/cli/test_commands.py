@@ -391,6 +391,22 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     assert run(*grip, "--load", 1e6, "--limit", 50.0)[0] == NOT_FEASIBLE
 
 
+def test_slip_of_uploaded_logs_is_found_by_the_detector_that_is_asked_for(
+    run: Run, ramps: list[Path], url: str
+) -> None:
+    code, out, _ = run("upload", ramps[0], "--detector", "strain_rate", "--url", url, "--json")
+    (sent,) = json.loads(out)["uploads"]
+    with FrictionClient(url) as client:
+        detection = client.grasp_log(sent["grasp_log"]).detection
+    assert detection is not None
+    assert (code, detection.method) == (0, "strain_rate")
+    code, out, _ = run("upload", ramps[0], "--detector", "best", "--url", url, "--json")
+    (refused,) = json.loads(out)["uploads"]
+    assert code != 0
+    assert "best" in refused["reason"]
+    assert "strain_rate" in refused["reason"]
+
+
 def test_logs_are_given_their_sensor_and_asked_for_as_it_shows_friction(
     run: Run, ramps: list[Path], url: str, tmp_path: Path
 ) -> None:
