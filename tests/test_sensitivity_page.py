@@ -43,11 +43,9 @@ ENTRIES = {
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": (
-        "force_floor heading_length ratio_motion",
-        "0 but of reconstructed forces, which the page's logs do not have; of motion not measured there yet",
+        "force_floor heading_length",
+        "0 but of reconstructed forces, which the page's logs do not have",
     ),
-    "coarse": ("few_elements few_odds filter_weight forces_weight", "not measured there yet"),
-    "ControlSettings": ("slide_deviations", "of sliding unseen, bounded both ways in tests/clients/test_relaxation.py"),
     "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": (
         "descents free_frames free_motion least_known least_square_arm rank settled still",
