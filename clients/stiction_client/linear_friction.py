@@ -226,7 +226,7 @@ class LinearFriction:
         from scipy import special
 
         count = self._averaged_elements(of, elements)
-        v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+        v, f_n = np.broadcast_arrays(*self._point(tangential_velocity, normal_force))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
         mean = x @ self.coefficients
         if quantile is None:
@@ -373,8 +373,12 @@ class LinearFriction:
         errors = [*self.standard_errors.tolist(), self.scale / math.sqrt(2.0 * self.scatter_degrees_of_freedom)]
         return [(*each[:2], *each[2], each[3]) for each in zip(values, errors, bounds, identifiable, strict=True)]
 
+    def _point(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[Number, Number]:
+        """Velocity, m/s, and normal force, N an element, at which friction is asked for."""
+        return np.asarray(tangential_velocity, dtype=float), np.asarray(normal_force, dtype=float)
+
     def _check_probability(self, name: str, value: float) -> None:
-        if not 0.0 < value < 1.0:
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < 1.0:
             raise self.refusal(name, value, "above 0 and below 1")
 
     def _averaged_elements(self, of: str, elements: float | None) -> float:

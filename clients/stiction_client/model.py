@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
-from stiction_client.arguments import shown, within
-from stiction_client.elementwise import FloatArray
+from stiction_client.arguments import within
+from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
     LinearFriction,
@@ -64,21 +64,6 @@ class FrictionModel(LinearFriction):
     created_at: str = ""
     scales: Scales | None = None
     outdated: bool = False
-
-    def predict(
-        self,
-        tangential_velocity: ArrayLike,
-        normal_force: ArrayLike,
-        quantile: float | None = None,
-        of: str = "element",
-        elements: float | None = None,
-    ) -> FloatArray:
-        """``LinearFriction.predict``; raises ``InvalidArgument`` for what is no velocity, force or quantile."""
-        v = within("tangential_velocity", tangential_velocity, *VELOCITIES)
-        f_n = within("normal_force", normal_force, *FORCES)
-        if quantile is not None and (isinstance(quantile, bool) or not isinstance(quantile, int | float | np.number)):
-            raise InvalidArgument("quantile", shown(quantile), "one number above 0 and below 1")
-        return LinearFriction.predict(self, v, f_n, quantile, of, elements)
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
@@ -163,3 +148,9 @@ class FrictionModel(LinearFriction):
     def stale(self) -> str | None:
         """Why this is not the material's model any more; None while it is."""
         return OUTDATED if self.outdated else None if self.current else SUPERSEDED
+
+    def _point(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[Number, Number]:
+        """``LinearFriction._point``; raises ``InvalidArgument`` for what is no magnitude."""
+        return within("tangential_velocity", tangential_velocity, *VELOCITIES), within(
+            "normal_force", normal_force, *FORCES
+        )
