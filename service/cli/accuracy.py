@@ -9,13 +9,14 @@ import typer
 
 from service.cli.connection import connected
 from service.cli.inputs import read_log, refuse_inputs
-from service.cli.options import DEFAULT_URL, Key, Mapping, Picture, Url
+from service.cli.options import DEFAULT_URL, FrameRate, Json, Key, Mapping, Picture, Rest, Scale, Url
 from service.cli.output import print_json, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import number
 
 if TYPE_CHECKING:
     from service.report.work_precision import Setting, WorkPrecision
+    from slipcore import GraspLog
 
 
 def accuracy(
@@ -29,11 +30,14 @@ def accuracy(
     ],
     seconds: Annotated[float, typer.Option(help="To spend on the grids of a scene, about.")] = 20.0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of a scene's random fields and noise.")] = 0,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     picture: Picture = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+    json: Json = False,
 ) -> None:
     """Draw what accuracy costs in seconds, and say what to ask for: simulating a scene, detecting slip, fitting."""
     paths = [Path(each) for each in what]
@@ -43,7 +47,8 @@ def accuracy(
     if len(paths) == 1 and _is_scene(what[0]):
         found = [_of_scene(what[0], seconds, seed)]
     elif all(path.exists() for path in paths):
-        found = _of_logs(paths, mapping)
+        logs = [read_log(path, mapping, scale, frame_rate, rest) for path in paths]
+        found = _of_logs(paths[0].name, logs)
     elif len(paths) == 1 and len(paths[0].parts) == 1:
         found = [_of_material(what[0], url, key)]
     else:
@@ -67,15 +72,14 @@ def _of_scene(name: str, seconds: float, seed: int) -> "WorkPrecision":
         return work_precision.of_scene(scene, seconds, seed, tell)
 
 
-def _of_logs(paths: list[Path], mapping: Path | None) -> "list[WorkPrecision]":
-    """Of detection in the first log, and of a fit to all of them where they have slip enough."""
+def _of_logs(first: str, logs: "list[GraspLog]") -> "list[WorkPrecision]":
+    """Of detection in the first log, by its name, and of a fit to all of them where they have slip enough."""
     from estimators import TooFewSamples
     from service.report import work_precision
     from slipcore import InvalidInput, collect_samples, detect_slip
 
-    logs = [read_log(path, mapping) for path in paths]
-    with shown_progress(f"detecting slip in {paths[0].name} by every method") as tell:
-        found = [work_precision.of_detection(logs[0], paths[0].name, tell)]
+    with shown_progress(f"detecting slip in {first} by every method") as tell:
+        found = [work_precision.of_detection(logs[0], first, tell)]
     try:
         grasps = [collect_samples(log, detect_slip(log)) for log in counted(logs, len(logs), "logs looked at")]
         with shown_progress("fitting by every method") as tell:

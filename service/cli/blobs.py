@@ -1,12 +1,14 @@
 """Commands on the files that are stored: prune."""
 
 from datetime import timedelta
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from db.defaults import QUARANTINE_AGE
 from service.cli.durations import duration, in_words
+from service.cli.options import Json
+from service.cli.output import print_json
 from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
@@ -32,6 +34,7 @@ def prune(
         bool, typer.Option("--trust-clock", help="Delete by a clock that nothing stored vouches for.")
     ] = False,
     database_url: Url = None,
+    json: Json = False,
 ) -> None:
     """Say what may be deleted, and with --delete do so: old uploads, and files to which nothing refers.
 
@@ -49,21 +52,44 @@ def prune(
     chosen = _age("grace", grace, Settings().keep_unreferenced_days)
     waiting = QUARANTINE_AGE if chosen is None else chosen
     uploads_only = older_than is not None and not delete
+    deletes = delete or (uploads_only and not dry_run)
+    done: dict[str, Any] = {"deleted": deletes}
     with opened(database_url) as database:
         migrate.check(database)
         blobs = opened_blobs()
         identity.verify(database, blobs)
         with database.read() as session:
-            doubtful = None if trust_clock or not (delete or (uploads_only and not dry_run)) else doubt(session)
+            doubtful = doubt(session) if deletes and not trust_clock else None
         if doubtful is not None:
             raise typer.BadParameter(f"the clock says {doubtful}; allowed: --trust-clock, where it is right")
         if age is not None:
-            _prune_uploads(database, blobs, age, delete=delete or (uploads_only and not dry_run))
+            done["uploads"] = _prune_uploads(database, blobs, age, delete=deletes)
+            if not json:
+                _tell_uploads(done["uploads"], deleted=deletes)
         if not uploads_only:
-            _prune_unreferenced(database, blobs, waiting, delete=delete)
+            done["unreferenced"] = _prune_unreferenced(database, blobs, waiting, delete=deletes)
+            if not json:
+                _tell_unreferenced(done["unreferenced"], deleted=deletes, waiting=in_words(waiting))
+    if json:
+        print_json(done)
 
 
-def _prune_uploads(database: "Database", blobs: "BlobStore", age: timedelta, *, delete: bool) -> None:
+def _tell_uploads(found: dict[str, int], *, deleted: bool) -> None:
+    what = f"{found['files']} uploads ({found['bytes']} bytes)"
+    typer.echo(f"deleted {what}" if deleted else f"{what} would be deleted")
+
+
+def _tell_unreferenced(found: dict[str, int], *, deleted: bool, waiting: str) -> None:
+    if deleted:
+        typer.echo(f"deleted {found['files']} unreferenced files")
+        typer.echo(f"set {found['set_aside']} unreferenced files aside")
+    else:
+        typer.echo(f"{found['files']} unreferenced files would be deleted, which are in quarantine for {waiting}")
+        typer.echo(f"{found['set_aside']} unreferenced files would be set aside")
+
+
+def _prune_uploads(database: "Database", blobs: "BlobStore", age: timedelta, *, delete: bool) -> dict[str, int]:
+    """Of old uploads, how many files and bytes are deleted, or would be."""
     from db.repositories import uploads
     from db.tables import now
     from service.jobs.retention import prune as delete_old
@@ -72,22 +98,19 @@ def _prune_uploads(database: "Database", blobs: "BlobStore", age: timedelta, *, 
     with database.read() as session:
         count, size = uploads.count_old(session, before)
     if delete:
-        typer.echo(f"deleted {delete_old(database, blobs, before, actor=command_actor())} uploads ({size} bytes)")
-    else:
-        typer.echo(f"{count} uploads ({size} bytes) would be deleted")
+        count = delete_old(database, blobs, before, actor=command_actor())
+    return {"files": count, "bytes": size}
 
 
-def _prune_unreferenced(database: "Database", blobs: "BlobStore", grace: timedelta, *, delete: bool) -> None:
+def _prune_unreferenced(database: "Database", blobs: "BlobStore", grace: timedelta, *, delete: bool) -> dict[str, int]:
+    """How many files that nothing refers to are deleted and set aside, or would be."""
     from service.jobs import garbage
 
     if delete:
-        typer.echo(f"deleted {garbage.delete_set_aside(database, blobs, grace, command_actor())} unreferenced files")
-        typer.echo(f"set {garbage.set_aside(database, blobs)} unreferenced files aside")
-        return
+        deleted = garbage.delete_set_aside(database, blobs, grace, command_actor())
+        return {"files": deleted, "set_aside": garbage.set_aside(database, blobs)}
     old, new = garbage.find_deletable(database, blobs, grace), garbage.find_unreferenced(database, blobs)
-    due, kept = sum(1 for _ in old), in_words(grace)
-    typer.echo(f"{due} unreferenced files would be deleted, which are in quarantine for {kept}")
-    typer.echo(f"{sum(1 for _ in new)} unreferenced files would be set aside")
+    return {"files": sum(1 for _ in old), "set_aside": sum(1 for _ in new)}
 
 
 def _age(name: str, text: str | None, days: float | None) -> timedelta | None:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
+from service.cli.options import Json
+from service.cli.output import print_json
 from service.cli.stores import Url, command_actor, opened, opened_blobs
 
 if TYPE_CHECKING:
@@ -73,12 +75,16 @@ def downgrade(
 
 
 @app.command()
-def current(database_url: Url = None) -> None:
+def current(database_url: Url = None, json: Json = False) -> None:
     """Print the database's revision."""
     from db import migrate
 
     with opened(database_url) as database:
-        typer.echo(migrate.current(database) or "empty")
+        found = migrate.current(database)
+    if json:
+        print_json({"revision": found, "newest": migrate.head()})
+    else:
+        typer.echo(found or "empty")
 
 
 @app.command()
@@ -87,6 +93,7 @@ def check(
     deep: Annotated[
         bool, typer.Option("--deep", help="Read every file, too: its bytes must be those of before.")
     ] = False,
+    json: Json = False,
 ) -> None:
     """Make sure that the schema is this version's, that an SQLite file is whole, and that every file that rows refer to
     is there; exit code 3 if not.
@@ -97,16 +104,23 @@ def check(
     with opened(database_url) as database:
         migrate.check(database)
         database.check_pages()  # of a file that was opened: another is nobody's yet
-        typer.echo("the schema is this version's")
+        if not json:
+            typer.echo("the schema is this version's")
         blobs = opened_blobs()
         identity.verify(database, blobs)
-        is_whole = True
-        for line in damaged(database, blobs, deep=deep):
-            typer.echo(line, err=True)
-            is_whole = False
-    if not is_whole:
+        found = list(map(_named_on_stderr, damaged(database, blobs, deep=deep)))
+    if json:
+        print_json({"revision": migrate.head(), "deep": deep, "damaged": found})
+    if found:
         raise typer.Exit(INPUT_REFUSED)
-    typer.echo("every file is there" + (", and as it was" if deep else ""))
+    if not json:
+        typer.echo("every file is there" + (", and as it was" if deep else ""))
+
+
+def _named_on_stderr(line: str) -> str:
+    """Say on standard error what is damaged, as soon as it is found: to read all files takes long."""
+    typer.echo(line, err=True)
+    return line
 
 
 @app.command()

@@ -162,6 +162,7 @@ def convert(
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
     rest: Rest = None,
+    json: Json = False,
 ) -> None:
     """Write a grasp log of any format as a Stiction NPZ, Parquet or MCAP, bit for bit."""
     from service.formats import writing
@@ -170,7 +171,10 @@ def convert(
     refuse_inputs(output, log, mapping)
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     write_whole(output, lambda beside: writing.write(grasp, beside, name))
-    typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
+    if json:
+        print_json({"output": str(output), "format": name, "frames": len(grasp), "grid": grasp.grid})
+    else:
+        typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
 
 
 def export(
@@ -190,6 +194,7 @@ def export(
     rest: Rest = None,
     sensor_model: SensorModelFile = None,
     gel: GelFile = None,
+    json: Json = False,
 ) -> None:
     """Write grasp logs with the slip detected in them for Foxglove, Rerun or LeRobot (docs/exports.md)."""
     from service import exports
@@ -204,8 +209,13 @@ def export(
     recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))
     exports.write(recordings, output, target)
     frames = sum(len(recording.log) for recording in recordings)
+    by_displacement = sum(recording.log.has_reconstructed_force for recording in recordings)
+    if json:
+        about = {"output": str(output), "target": target, "frames": frames, "grasps": len(logs)}
+        print_json(about | {"with_reconstructed_forces": by_displacement})
+        return
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
-    if by_displacement := sum(recording.log.has_reconstructed_force for recording in recordings):
+    if by_displacement:
         typer.echo(f"forces of {by_displacement} of {len(logs)} grasp(s) are reconstructed from displacement")
 
 

@@ -5,17 +5,22 @@ from typing import Annotated
 import typer
 
 from service.cli.connection import connected
-from service.cli.options import DEFAULT_URL, Key, MaterialName, Url
+from service.cli.options import DEFAULT_URL, Json, Key, MaterialName, Url
+from service.cli.output import print_json
 
 app = typer.Typer(help="Show and change whose a material is.", no_args_is_help=True)
 Owner = Annotated[str, typer.Argument(help="A key such as key:3f9c2a7b51de, or a group of keys such as group:lab.")]
 
 
 @app.command("list")
-def list_owners(material: MaterialName, url: Url = DEFAULT_URL, key: Key = None) -> None:
+def list_owners(material: MaterialName, url: Url = DEFAULT_URL, key: Key = None, json: Json = False) -> None:
     """Print the owners of a material, one a line; none: whoever has the scope may add to it."""
     with connected(url, key) as client:
-        for owner in client.owners(material):
+        found = client.owners(material)
+    if json:
+        print_json({"owners": found})
+    else:
+        for owner in found:
             typer.echo(owner)
 
 

@@ -66,8 +66,7 @@ def upload(
         if create and material is not None:
             client.ensure_material(material)
         asked = material, sensor, detector
-        table = {"scale": scale, "frame_rate": frame_rate, "rest": rest}
-        results = list(counted((_upload(client, each, wait, asked, table) for each in sources), len(sources), "logs"))
+        results = list(counted((_upload(client, each, wait, asked) for each in sources), len(sources), "logs"))
     if json:
         print_json({"uploads": results})
     else:
@@ -230,9 +229,8 @@ def _upload(
     source: Source,
     wait: bool,
     asked: tuple[str | None, str | None, str | None],
-    table: dict[str, Any],
 ) -> dict[str, Any]:
-    """Upload one log: ``asked`` are its material, sensor and detector; a ``table`` that was not read here needs more.
+    """Upload one log: ``asked`` are its material, sensor and detector.
 
     That it is not read or that the service does not take it is a result like any other.
     """
@@ -240,9 +238,8 @@ def _upload(
     from stiction_client import ProblemError, problems
 
     try:
-        log, mapping = source.log()
-        options = table if isinstance(log, Path) else {}
-        receipt = client.upload(log, *asked, mapping=mapping, **options)
+        log, options = source.log()
+        receipt = client.upload(log, *asked, **options)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:

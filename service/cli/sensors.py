@@ -3,17 +3,21 @@
 from collections.abc import Mapping, Sequence
 from json import dumps, loads
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli import sources
 from service.cli.connection import connected
-from service.cli.inputs import read_log, refuse_inputs
+from service.cli.inputs import read_log, refuse_inputs, rest_of
 from service.cli.options import DEFAULT_URL, FrameRate, Json, Key, Rest, Scale, Url
 from service.cli.options import Mapping as MappingFile
 from service.cli.output import print_json, print_table
 from service.formatting import interval, number
 from service.whole_files import write_whole
+
+if TYPE_CHECKING:
+    from slipcore import GraspLog
 
 app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
 
@@ -87,7 +91,10 @@ def calibrate(
         list[float] | None,
         typer.Option(help="Normal force with which the body pressed, N: one of all logs, or given once for each."),
     ] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     mapping: MappingFile = None,
+    rest: Rest = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the sensor model to this JSON.")] = None,
     store: Annotated[
         bool,
@@ -99,12 +106,16 @@ def calibrate(
     json: Json = False,
 ) -> None:
     """Learn a sensor's faults from pure presses: zero, drift, crosstalk, smoothing, noise and gain."""
-    if store and (output is not None or mapping is not None):
-        raise typer.BadParameter("--store with --output or --mapping; allowed: one of them")
+    if store and output is not None:
+        raise typer.BadParameter("--store with --output; allowed: one of them")
     if output is not None:
         refuse_inputs(output, *logs, mapping)
-    forces = _known_forces(known_force, len(logs))
-    calibration = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
+    if store:
+        found = sources.found(logs, mapping, scale=scale, frame_rate=frame_rate, rest=rest_of(rest))
+        calibration = _stored(found, _known_forces(known_force, len(found)), sensor, url, key)
+    else:
+        forces = _known_forces(known_force, len(logs))
+        calibration = _learnt([read_log(path, mapping, scale, frame_rate, rest) for path in logs], forces)
     if output is not None:
         write_whole(output, lambda beside: beside.write_text(dumps(calibration), encoding="utf-8"))
     if json:
@@ -196,20 +207,21 @@ def _gel_cells(estimate: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
     return named, value, known, f"{estimate['information']:.1%}", estimate["note"]
 
 
-def _learnt(logs: list[Path], forces: list[float] | None, mapping: Path | None) -> dict[str, Any]:
+def _learnt(logs: "list[GraspLog]", forces: list[float] | None) -> dict[str, Any]:
     """The sensor model of presses on this machine, as JSON has it."""
     from slipcore import calibrate_sensor
 
-    return calibrate_sensor([read_log(path, mapping) for path in logs], forces).to_json()
+    return calibrate_sensor(logs, forces).to_json()
 
 
 def _stored(
-    logs: list[Path], forces: list[float] | None, sensor: str | None, url: str, key: str | None
+    logs: list[sources.Source], forces: list[float] | None, sensor: str | None, url: str, key: str | None
 ) -> dict[str, Any]:
     """The calibration that a service makes of these logs, as it answers."""
     with connected(url, key) as client:
-        receipts = [client.upload(path, sensor=sensor) for path in logs]
-        known: Sequence[float | None] = forces or [None] * len(logs)
+        sent = (source.log() for source in logs)
+        receipts = [client.upload(log, sensor=sensor, **options) for log, options in sent]
+        known: Sequence[float | None] = forces or [None] * len(receipts)
         return client.calibrate_sensor(
             receipts[0].sensor, {receipt.id: force for receipt, force in zip(receipts, known, strict=True)}
         )

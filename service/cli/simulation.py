@@ -11,7 +11,7 @@ import typer
 
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED
 from service.cli.inputs import refuse_inputs
-from service.cli.options import Picture
+from service.cli.options import Json, Picture
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import number
@@ -45,7 +45,7 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Seed of random fields and of noise.")] = 0,
     output: Annotated[Path | None, typer.Option(help="Write the grasp log with its truth to this NPZ.")] = None,
     picture: Picture = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+    json: Json = False,
 ) -> None:
     """Simulate a grasp whose slip, forces and friction are known."""
     from slipcore.contact import Scene
@@ -101,7 +101,7 @@ def campaign(
     written_as: Annotated[
         str, typer.Option("--format", help='"npz", or "parquet" for one data set in folders by scene and seed.')
     ] = "npz",
-    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+    json: Json = False,
 ) -> None:
     """Simulate many grasps, each scene with many seeds, on all cores or on a Dask cluster."""
     from service.jobs.campaign import RequestedAccuracy, run, workers

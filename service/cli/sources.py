@@ -20,10 +20,10 @@ Mapping = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A log by its name, and what gives it: a file as it is with its mapping, or a log that was read here."""
+    """A log by its name, and what gives it with its upload's options: a file as it is, or a log that was read here."""
 
     name: str
-    log: "Callable[[], tuple[Path | GraspLog, Mapping | None]]"
+    log: "Callable[[], tuple[Path | GraspLog, Mapping]]"
 
 
 def found(paths: Sequence[Path], mapping: Path | None, **table: Any) -> list[Source]:
@@ -46,7 +46,7 @@ def found(paths: Sequence[Path], mapping: Path | None, **table: Any) -> list[Sou
 def _file(path: Path, mapping: Mapping | None, table: Mapping) -> Source:
     if isinstance(table.get("rest"), Path):
         return _read_here(path.name, path, mapping, table)
-    return Source(path.name, lambda: (path, mapping))
+    return Source(path.name, lambda: (path, {"mapping": mapping, **table}))
 
 
 def _of_folder(folder: Path, mapping: Mapping | None, table: Mapping) -> Iterator[Source]:
@@ -77,7 +77,7 @@ def _read_here(name: str, path: Path, mapping: Mapping | None, table: Mapping) -
     return Source(name, partial(_log, path, mapping, table))
 
 
-def _log(path: Path, mapping: Mapping | None, table: Mapping) -> "tuple[GraspLog, None]":
+def _log(path: Path, mapping: Mapping | None, table: Mapping) -> "tuple[GraspLog, Mapping]":
     from service import formats
 
-    return formats.read(path, mapping=None if mapping is None else dumps(mapping), **table), None
+    return formats.read(path, mapping=None if mapping is None else dumps(mapping), **table), {}

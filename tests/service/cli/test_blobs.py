@@ -28,8 +28,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, timedelta, bool]]:
     monkeypatch.setattr(steady_clock, "doubt", lambda _: None)
     for name in ("uploads", "unreferenced"):
 
-        def note(_: Any, __: Any, age: timedelta, *, delete: bool, name: str = name) -> None:
+        def note(_: Any, __: Any, age: timedelta, *, delete: bool, name: str = name) -> dict[str, int]:
             told.append((name, age, delete))
+            return {"files": 0, "bytes": 0, "set_aside": 0}
 
         monkeypatch.setattr(blobs, f"_prune_{name}", note)
     return told

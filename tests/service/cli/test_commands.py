@@ -16,6 +16,8 @@ import h5py
 import httpx
 import numpy as np
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
 
 import slipcore
 from benchmarks.calibration.presses import Faults, pressed
@@ -90,6 +92,15 @@ def url(tmp_path_factory: pytest.TempPathFactory, serving: Serving) -> Iterator[
         yield str(client.base_url)
 
 
+DO_AND_TELL_NO_MORE = {
+    *("demo", "serve", "worker", "open", "report", "logs withdraw", "jobs cancel", "keys revoke"),
+    *("materials rename", "materials merge", "materials begin-epoch", "owners add", "owners remove"),
+    *("sensors describe", "sensor describe"),
+    *("db upgrade", "db downgrade", "db backup", "db restore", "db adopt"),
+}
+"""Commands without ``--json``: what they did follows from their exit code."""
+
+
 def command_names() -> list[str]:
     names = [c.name or c.callback.__name__.replace("_", "-") for c in app.registered_commands if c.callback is not None]
     return [*names, *(str(g.name) for g in app.registered_groups)]
@@ -101,6 +112,23 @@ def test_every_command_explains_itself_and_is_documented(name: str, run: Run) ->
     assert code == 0
     assert "Usage" in out
     assert f"`stiction {name}" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+
+
+def options_of(command: Any, name: str = "") -> Iterator[tuple[str, set[str]]]:
+    """Each command of a group by its words, with its options."""
+    if isinstance(command, TyperGroup):
+        for own, inner in command.commands.items():
+            yield from options_of(inner, f"{name} {own}".strip())
+    else:
+        yield name, {option for parameter in command.params for option in parameter.opts}
+
+
+def test_commands_are_read_by_programs_and_read_logs_alike() -> None:
+    commands = dict(options_of(get_command(app)))
+    assert {name for name, options in commands.items() if "--json" not in options} == DO_AND_TELL_NO_MORE
+    for name, options in commands.items():
+        if "--mapping" in options:
+            assert options >= {"--scale", "--frame-rate", "--rest"}, name
 
 
 def test_the_key_of_the_environment_is_sent_and_not_shown(run: Run, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,10 +204,18 @@ def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp
 
 
 @pytest.mark.parametrize(
-    "command", [["fit"], ["export", "--output", "out.mcap"], ["sensors", "calibrate-gel", "--known-force", 1.0]]
+    "command",
+    [
+        ["fit"],
+        ["export", "--output", "out.mcap"],
+        ["accuracy"],
+        ["sensors", "calibrate"],
+        ["sensors", "calibrate-gel", "--known-force", "1.0"],
+    ],
+    ids=" ".join,
 )
 def test_every_command_that_reads_logs_takes_what_a_table_leaves_out(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[object]
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     dots = tmp_path / "dots.csv"
@@ -670,6 +706,9 @@ def test_db_upgrade_makes_a_database_that_check_approves_of(
     assert run("db", "check", "--database-url", database)[0] != 0
     assert run("db", "upgrade", "--database-url", database)[0] == 0
     assert run("db", "check", "--database-url", database)[0] == 0
+    revision = run("db", "current", "--database-url", database)[1].strip()
+    told = json.loads(run("db", "current", "--database-url", database, "--json")[1])
+    assert told == {"revision": revision, "newest": revision}
 
 
 @pytest.mark.parametrize(
@@ -755,6 +794,8 @@ def test_check_tells_files_that_are_missing_or_changed(
     blobs.remove([lost])
     code, _, err = run("db", "check")
     assert (code, err) == (INPUT_REFUSED, f"blob {lost} is missing\n")
+    code, out, err = run("db", "check", "--json")
+    assert (code, json.loads(out)["damaged"], json.loads(out)["deep"]) == (INPUT_REFUSED, err.splitlines(), False)
     assert f"blob {changed} has other bytes than it had: their hash is " in run("db", "check", "--deep")[2]
 
 
@@ -810,6 +851,9 @@ def test_a_log_is_converted_and_read_by_its_mapping(run: Run, ramps: list[Path],
     for source, target in itertools.pairwise(steps):
         assert run("convert", source, target)[0] == 0
     assert steps[-1].read_bytes() == ramps[0].read_bytes()
+    made = json.loads(run("convert", ramps[0], steps[-1], "--json")[1])
+    log = formats.read(ramps[0])
+    assert made == {"output": str(steps[-1]), "format": "npz", "frames": len(log), "grid": list(log.grid)}
     (tmp_path / "mapping.json").write_text('{"time": "clock"}')
     code, _, err = run("detect", tmp_path / "log.parquet", "--mapping", tmp_path / "mapping.json")
     assert code == INPUT_REFUSED
@@ -886,6 +930,7 @@ def test_owners_and_the_audit_trail_from_the_command_line(run: Run, url: str) ->
         client.create_material("owned")
     assert run("owners", "add", "owned", "group:lab 1", "--url", url)[:2] == (0, "owned belongs to group:lab 1\n")
     assert run("owners", "list", "owned", "--url", url)[:2] == (0, "group:lab 1\n")
+    assert json.loads(run("owners", "list", "owned", "--json", "--url", url)[1]) == {"owners": ["group:lab 1"]}
     assert run("owners", "remove", "owned", "group:lab 1", "--url", url)[0] == 0
     assert run("owners", "add", "owned", "robot", "--url", url)[0] == SERVICE_REFUSED
     entries = json.loads(run("audit", "--subject", "owned", "--json", "--url", url)[1])["entries"]

@@ -19,6 +19,7 @@ CROSSTALK = {
     "name": "crosstalk_x", "unit": "-", "value": 0.08, "low": 0.07, "high": 0.09, "not_identified": None
 }  # fmt: skip
 GAIN = CROSSTALK | {"name": "gain", "value": None, "not_identified": "no total force is known"}
+TABLE = {"mapping": None, "scale": None, "frame_rate": None, "rest": None}
 TOLD = {"estimates": [CROSSTALK, GAIN]}
 
 
@@ -29,6 +30,7 @@ def client(monkeypatch: pytest.MonkeyPatch) -> Mock:
     told.calibrate_sensor.return_value = TOLD | {"version": 3}
     monkeypatch.setattr(sensors, "connected", lambda *_: nullcontext(told))
     monkeypatch.setattr(sensors, "_learnt", lambda *_: TOLD)
+    monkeypatch.setattr(sensors, "read_log", lambda *_: None)
     return told
 
 
@@ -40,7 +42,7 @@ def run(*arguments: str) -> int:
 
 def test_each_log_of_a_calibration_is_sent_with_its_own_force(client: Mock, capsys: Capture) -> None:
     assert run("calibrate", "1.npz", "2.npz", "--known-force", "2", "--known-force", "3", "--store") == 0
-    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": None}] * 2
+    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": None, **TABLE}] * 2
     client.calibrate_sensor.assert_called_once_with("left", {"a": 2.0, "b": 3.0})
     title, _, _, *rows = capsys.readouterr().out.splitlines()
     assert title == "Calibration by 2 logs, version 3"
@@ -52,7 +54,7 @@ def test_each_log_of_a_calibration_is_sent_with_its_own_force(client: Mock, caps
 
 def test_forces_that_nobody_measured_are_not_known_to_the_service(client: Mock) -> None:
     assert run("calibrate", "1.npz", "2.npz", "--store", "--sensor", "right") == 0
-    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": "right"}] * 2
+    assert [call.kwargs for call in client.upload.call_args_list] == [{"sensor": "right", **TABLE}] * 2
     client.calibrate_sensor.assert_called_once_with("left", {"a": None, "b": None})
 
 
@@ -61,8 +63,18 @@ def test_a_calibration_of_this_machine_is_written_whole(client: Mock, tmp_path: 
     assert json.loads((tmp_path / "model.json").read_text(encoding="utf-8")) == TOLD
     assert json.loads(capsys.readouterr().out) == TOLD
     client.upload.assert_not_called()
-    for more in (["--output", "x.json"], ["--mapping", "x.json"]):
-        assert run("calibrate", "1.npz", "--store", *more) == 2
+    assert run("calibrate", "1.npz", "--store", "--output", "x.json") == 2
+
+
+def test_a_table_is_sent_to_a_calibration_with_what_it_leaves_out(client: Mock, tmp_path: Path) -> None:
+    (tmp_path / "1.csv").touch()
+    about = ("--scale", "2e-5", "--frame-rate", "30", "--rest", "first", "--mapping", "uskin")
+    assert run("calibrate", str(tmp_path), "--store", "--known-force", "2", *about) == 0
+    (sent,) = client.upload.call_args_list
+    assert sent.args == (tmp_path / "1.csv",)
+    given = {name: sent.kwargs[name] for name in ("scale", "frame_rate", "rest")}
+    assert given == {"scale": 2e-5, "frame_rate": 30.0, "rest": "first"}
+    assert sent.kwargs["mapping"]
 
 
 @pytest.mark.parametrize(("thickness", "told"), [(1.0, 1.0), (1.001, None), (4e-3, 4e-3)])

@@ -33,19 +33,19 @@ def test_what_is_named_comes_in_its_order_and_a_recording_is_one_log(tmp_path: P
     assert told == ["1.npz", "more.txt", "bag", "alone.npz", "tac", "absent.npz"]
 
 
-def test_a_file_is_handed_on_as_it_is_with_its_mapping(tmp_path: Path) -> None:
+def test_a_file_is_handed_on_as_it_is_with_what_its_upload_says_of_it(tmp_path: Path) -> None:
     (tmp_path / "mapping.json").write_text('{"time": "t", "displacement": "u"}')
     (source,) = found([tmp_path / "a.npz"], tmp_path / "mapping.json")
-    path, mapping = source.log()
+    path, options = source.log()
     assert path == tmp_path / "a.npz"
-    assert mapping is not None
-    assert (mapping["time"], mapping["displacement"]) == ("t", "u")
-    assert found([tmp_path / "a.npz"], None)[0].log() == (tmp_path / "a.npz", None)
+    assert (options["mapping"]["time"], options["mapping"]["displacement"]) == ("t", "u")
+    (alone,) = found([tmp_path / "a.npz"], None, scale=2.0, rest="first")
+    assert alone.log() == (tmp_path / "a.npz", {"mapping": None, "scale": 2.0, "rest": "first"})
 
 
 def test_a_log_is_read_here_where_its_rest_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[object] = []
     monkeypatch.setattr(formats, "read", lambda path, **given: asked.append((path, given)))
     (source,) = found([tmp_path / "a.npz"], None, scale=2.0, rest=tmp_path / "rest.npz")
-    assert source.log()[1] is None
+    assert source.log()[1] == {}
     assert asked == [(tmp_path / "a.npz", {"mapping": None, "scale": 2.0, "rest": tmp_path / "rest.npz"})]

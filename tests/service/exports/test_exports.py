@@ -1,5 +1,6 @@
 """The command that writes logs for others' tools, and what it refuses."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
@@ -146,3 +147,13 @@ def test_of_how_many_grasps_forces_are_reconstructed_is_printed(
         main(["export", str(tmp_path / "log.npz"), "-o", str(tmp_path / "dataset")])
     told = "forces of 1 of 1 grasp(s) are reconstructed from displacement"
     assert (told in capsys.readouterr().out) is is_told
+    with pytest.raises(SystemExit):
+        main(["export", str(tmp_path / "log.npz"), "-o", str(tmp_path / "other"), "--json"])
+    made = json.loads(capsys.readouterr().out)
+    assert made == {
+        "output": str(tmp_path / "other"),
+        "target": "lerobot",
+        "frames": len(recording.log),
+        "grasps": 1,
+        "with_reconstructed_forces": int(is_told),
+    }

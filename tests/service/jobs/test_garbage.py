@@ -1,3 +1,4 @@
+import json
 import os
 import time
 from collections.abc import Callable
@@ -135,6 +136,8 @@ def test_the_command_tells_and_only_with_delete_does(
     deleted = "0 unreferenced files would be deleted, which are in quarantine for 7 days"
     assert run() == (0, [deleted, "1 unreferenced files would be set aside"])
     assert blobs.has(orphan)
+    told = json.loads("".join(run("--json")[1]))
+    assert told == {"deleted": False, "unreferenced": {"files": 0, "set_aside": 1}}
     assert run("--delete") == (0, ["deleted 0 unreferenced files", "set 1 unreferenced files aside"])
     assert run("--delete", "--grace", "0h") == (0, ["deleted 1 unreferenced files", "set 0 unreferenced files aside"])
     assert list(blobs.quarantine.hashes()) == []

@@ -1,3 +1,4 @@
+import json
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -287,6 +288,8 @@ def test_the_command_counts_and_deletes(
     log_id = shelf.store(content, days=1.5)
     assert run("--older-than", "2d", "--dry-run")[1] == "0 uploads (0 bytes) would be deleted\n"
     assert run("--older-than", "12h", "--dry-run")[1] == f"1 uploads ({len(content)} bytes) would be deleted\n"
+    told = json.loads(run("--older-than", "12h", "--dry-run", "--json")[1])
+    assert told == {"deleted": False, "uploads": {"files": 1, "bytes": len(content)}}
     assert shelf.file(log_id).status_code == httpx.codes.OK
     assert run("--older-than", "12h")[1] == f"deleted 1 uploads ({len(content)} bytes)\n"
     assert shelf.file(log_id).status_code == httpx.codes.GONE
