@@ -36,7 +36,8 @@ from db.sqlite_file import SqliteFile
 
 _BEGIN = "sqlite_begin"
 _DURABLE = "durable"
-SCHEMES = "sqlite:// or postgresql://"
+SCHEMES = ("sqlite", "postgresql")
+"""Of the databases that are known."""
 _READ_ONLY = "25006"
 """SQLSTATE of a PostgreSQL that takes no writes: a standby that has not been promoted yet."""
 
@@ -197,8 +198,9 @@ def _engine(url: URL) -> Engine:
         allowed = "a path, such as sqlite:////var/lib/stiction/stiction.sqlite3"
         found = f"{url.database or 'nothing'}, not a file by its path"
         raise InvalidUrl(f"database URL of SQLite names {found}; allowed: {allowed}")
-    if url.get_backend_name() not in ("sqlite", "postgresql"):
-        raise InvalidUrl(f"database URL begins with {url.drivername}://; allowed: {SCHEMES}")
+    allowed = " or ".join(f"{scheme}://" for scheme in SCHEMES)
+    if url.get_backend_name() not in SCHEMES:
+        raise InvalidUrl(f"database URL begins with {url.drivername}://; allowed: {allowed}")
     if "@" in (url.host or ""):  # what follows the first one would be told to everybody as a host that is not found
         raise InvalidUrl("database URL has an @ in its user or password; allowed: %40")
     options: dict[str, Any] = {"pool_size": POOL_SIZE, "max_overflow": SQLITE_POOL_OVERFLOW}
@@ -212,7 +214,7 @@ def _engine(url: URL) -> Engine:
     except ModuleNotFoundError as error:
         raise DriverMissing(url.render_as_string(hide_password=True), error.name or str(error)) from error
     except NoSuchModuleError as error:
-        raise InvalidUrl(f"database URL begins with {url.drivername}://; allowed: {SCHEMES}") from error
+        raise InvalidUrl(f"database URL begins with {url.drivername}://; allowed: {allowed}") from error
 
 
 def _prepare_postgresql(engine: Engine, lock_timeout: float) -> None:

@@ -12,6 +12,9 @@ from uuid import uuid4
 from db.defaults import OBJECT_STORE_TIMEOUT
 from db.errors import DriverMissing, NotFound, StorageUnavailable
 
+SCHEMES = ("s3", "s3a", "gs", "az", "azure", "adl", "abfs", "abfss", "http", "https", "file")
+"""Of URLs that obstore takes, but for a store in memory, which keeps nothing."""
+
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _CLOCK = "clock"
 _QUARANTINE = "quarantine"
@@ -31,7 +34,7 @@ class ObjectStore:
             raise DriverMissing(url.partition("?")[0], "obstore", what="blob store", extra="s3") from error
         self._obstore, self._name = obstore, url.partition("?")[0]
         seconds = timedelta(seconds=OBJECT_STORE_TIMEOUT)
-        with _answered("blob store"):
+        with _answered(f"blob store {self._name}"):
             self._store: Any = from_url(
                 url,
                 client_options={"timeout": seconds, "connect_timeout": seconds, "allow_http": _is_plain_http()},

@@ -10,7 +10,11 @@ from urllib.parse import urlsplit
 from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from pydantic_settings import PydanticBaseSettingsSource as Source
-from sqlalchemy import URL
+from sqlalchemy import URL, make_url
+from sqlalchemy.exc import ArgumentError
+
+from db.database import SCHEMES
+from db.object_store import SCHEMES as BLOB_SCHEMES
 
 MIB = 2**20
 
@@ -201,6 +205,8 @@ class Settings(BaseSettings):
     def _shared_by_processes(cls, url: str | None) -> str | None:
         if url is not None and (":memory:" in url or url in {"sqlite://", "sqlite:///"}):
             raise ValueError("a file or a server: a database in memory is not seen by the worker processes")
+        if url is not None and _scheme(url).partition("+")[0] not in SCHEMES:
+            raise ValueError(f"a SQLAlchemy URL that begins with {' or '.join(f'{each}://' for each in SCHEMES)}")
         return url
 
     @field_validator("webhook_url")
@@ -215,8 +221,8 @@ class Settings(BaseSettings):
     @field_validator("blob_url")
     @classmethod
     def _kept(cls, url: str | None) -> str | None:
-        if url is not None and ("://" not in url or url.startswith("memory:")):
-            raise ValueError("s3://bucket/prefix and other URLs of obstore for stores that keep what they get")
+        if url is not None and ("://" not in url or _scheme(url) not in BLOB_SCHEMES):
+            raise ValueError(f"s3://bucket/prefix and other URLs of obstore, of {', '.join(BLOB_SCHEMES)}")
         return url
 
     @property
@@ -239,9 +245,25 @@ def complaints(error: ValidationError) -> str:
 
 def _complaint(name: str, value: object, message: str) -> str:
     field = Settings.model_fields.get(name)
-    shown = repr(str(value))[:100] if field is not None and field.repr else "not one that is allowed"
+    shown = repr(str(value))[:100] if field is not None and field.repr else None
+    if name == "database_url":
+        shown = _without_password(str(value))
     allowed = _range(name) or message.removeprefix("Input should be ").removeprefix("Value error, ")
-    return f"{PREFIX}{name.upper()} is {shown}; allowed: {allowed} (docs/settings.md)"
+    return f"{PREFIX}{name.upper()} is {shown or 'not one that is allowed'}; allowed: {allowed} (docs/settings.md)"
+
+
+def _scheme(url: str) -> str:
+    return url.partition("://")[0].lower()
+
+
+def _without_password(url: str) -> str | None:
+    """A database's URL as it may be shown; None where a part that is not known to be the password may hold it."""
+    try:
+        parsed = make_url(url)
+    except (ArgumentError, ValueError):
+        return None
+    is_clear = not parsed.query and "@" not in (parsed.host or "")
+    return repr(parsed.render_as_string(hide_password=True))[:100] if is_clear else None
 
 
 def _range(name: str) -> str | None:

@@ -137,6 +137,7 @@ def test_no_number_that_changes_results_stands_outside_of_the_tables() -> None:
 CLIENT = ROOT / "clients/stiction_client"
 
 CLIENT_OTHER = {
+    "address.py": "what an address may be",
     "calls.py": "waiting and retrying, which change no answer",
     "exchange.py": "waiting and retrying, which change no answer",
     "client.py": "waiting and retrying, which change no answer",

@@ -1,11 +1,12 @@
 """The two clients, one waiting and one awaiting: they carry out what ``calls`` describes."""
 
 import asyncio
+import math
 import os
 import time
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import aclosing, closing, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import aclosing, closing
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,14 +14,13 @@ from typing import Any, Self
 import httpx
 
 from stiction_client import calls, head_timeout
+from stiction_client.address import DEFAULT_URL, checked, service_address
 from stiction_client.arguments import for_json, within
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import AnswerTooLarge, ConnectionFailed, InvalidArgument
 from stiction_client.exchange import Call, Ended, Pause, Reply, Request, T, advance
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
-
-DEFAULT_URL = "http://127.0.0.1:8000"
 
 TIMEOUT = 30.0
 """s to wait for more of a request to leave or for an answer to begin, and until that is whole."""
@@ -42,9 +42,6 @@ UNPACKED = "gzip"
 
 GZIP = zlib.MAX_WBITS | 16
 """By which zlib knows that format."""
-
-SHOWN_URL = 80
-"""Characters of an address that an error shows."""
 
 
 class FrictionClient:
@@ -73,7 +70,7 @@ class FrictionClient:
     ) -> None:
         self._kept: dict[str, calls.CachedModel] = {}
         self._names: calls.Names = set()
-        self._stale_after = stale_after
+        self._stale_after = _stale_after(stale_after)
         self._http = httpx.Client(**_options(url, key, timeout), transport=transport)
 
     def __enter__(self) -> Self:
@@ -327,7 +324,7 @@ class AsyncFrictionClient:
     ) -> None:
         self._kept: dict[str, calls.CachedModel] = {}
         self._names: calls.Names = set()
-        self._stale_after = stale_after
+        self._stale_after = _stale_after(stale_after)
         self._http = httpx.AsyncClient(**_options(url, key, timeout), transport=transport)
 
     async def __aenter__(self) -> Self:
@@ -571,6 +568,10 @@ class _Content:
         return httpx.Response(status, headers=headers, content=bytes(self._content), request=request)
 
 
+def _stale_after(seconds: float) -> float:
+    return float(within("stale_after", seconds, 0.0, math.inf, "s"))
+
+
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
     key = os.environ.get("STICTION_KEY") if key is None else key
     url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
@@ -579,23 +580,11 @@ def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]
             "key", "one with other characters", "printable ASCII, as `stiction keys create` prints it"
         )
     timeout = float(within("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s"))
-    with _address_checked(url):
-        base_url = httpx.URL(url)
     return {
-        "base_url": base_url,
+        "base_url": service_address(url),
         "headers": {"Accept-Encoding": UNPACKED} | ({"Authorization": f"Bearer {key}"} if key else {}),
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
-
-
-@contextmanager
-def _address_checked(url: str) -> Iterator[None]:
-    """Say whose fault it is that ``url`` cannot be asked."""
-    try:
-        yield
-    except (httpx.InvalidURL, UnicodeError) as error:
-        shown = ascii(url) if len(url) <= SHOWN_URL else f"{url[:SHOWN_URL]!a}… ({len(url)} characters)"
-        raise InvalidArgument("address", f"{shown} ({error})", f"one such as {DEFAULT_URL}, in UTF-8") from error
 
 
 def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
@@ -607,7 +596,7 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
     headers = {name: value for name, value in given.items() if value is not None}
     answered_within = (http.timeout.read or 0.0) + request.wait_seconds
     bounded = head_timeout.bounded_async if isinstance(http, httpx.AsyncClient) else head_timeout.bounded
-    with _address_checked(request.path):
+    with checked(request.path):
         return http.build_request(
             request.method,
             request.path,

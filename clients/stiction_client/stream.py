@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
 from stiction_client import json_values
+from stiction_client.address import service_address
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
@@ -63,7 +64,7 @@ class SlipStream:
         materials: Sequence[str] = (),
     ) -> None:
         rest = np.asarray(position, dtype="<f8")
-        self._url = f"{url.rstrip('/').replace('http', 'ws', 1)}/v1/stream"
+        self._url = f"{str(service_address(url)).rstrip('/').replace('http', 'ws', 1)}/v1/stream"
         self._headers = {"Authorization": f"Bearer {key}"} if key else {}
         self._open = ExitStack()
         self._session, self._number, self._answered = "", 0, -1

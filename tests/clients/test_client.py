@@ -663,6 +663,40 @@ def test_an_address_that_is_none_is_refused_by_name(url: str) -> None:
     assert len(str(refused.value)) < 400
 
 
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+@pytest.mark.parametrize(
+    ("url", "why"),
+    [
+        ("htp://x", "it begins with neither http:// nor https://"),
+        ("localhost:8000", "it begins with neither http:// nor https://"),
+        ("127.0.0.1", "it begins with neither http:// nor https://"),
+        ("http://", "it names no host"),
+        ("https:///v1", "it names no host"),
+        ("http://x:0", "its port is not 1 to 65535"),
+        ("http://x:65536", "its port is not 1 to 65535"),
+    ],
+)
+def test_an_address_of_no_service_is_refused_before_the_first_call(client: Any, url: str, why: str) -> None:
+    """The first call had failed, as if the service were away."""
+    with pytest.raises(InvalidArgument, match=f"^address is '{url}' \\({why}\\); allowed: one such as http://127"):
+        client(url)
+
+
+@pytest.mark.parametrize("url", ["HTTP://x", "https://x:65535/behind/a/proxy/", "http://[::1]:1"])
+def test_an_address_of_a_service_is_taken(url: str) -> None:
+    with FrictionClient(url):
+        pass
+
+
+@pytest.mark.parametrize("seconds", [-1.0, math.nan, "60", None, True])
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+def test_an_age_of_models_is_a_time(client: Any, seconds: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^stale_after is .*; allowed: .*0 to inf s"):
+        client("http://stiction", stale_after=seconds)
+    with FrictionClient("http://stiction", stale_after=math.inf):
+        pass
+
+
 @pytest.mark.parametrize("actor", ["a" * 100_000, "\udcff"])
 def test_what_fits_into_no_address_is_refused_by_name(ask: Ask, service: Service, actor: str) -> None:
     server = service({"items": []})

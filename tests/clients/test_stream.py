@@ -11,7 +11,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.frames import Close
 
-from stiction_client import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer, stream
+from stiction_client import AnswerTimedOut, ConnectionFailed, InvalidArgument, UnexpectedAnswer, stream
 from stiction_client.stream import SlipStream
 
 OPENED = {"type": "opened", "session": "s"}
@@ -182,3 +182,10 @@ def test_a_service_of_another_kind_is_told(monkeypatch: pytest.MonkeyPatch, answ
     monkeypatch.setattr(stream, "connect", lambda *_, **__: nullcontext(made))
     with pytest.raises(UnexpectedAnswer):
         SlipStream("http://service/", np.zeros((2, 2, 3)), 1e-6)
+
+
+@pytest.mark.parametrize("url", ["localhost:8000", "htp://x", "http://", "http://x:99999"])
+def test_an_address_of_no_service_is_refused_by_name(url: str) -> None:
+    """The errors of the library had come through."""
+    with pytest.raises(InvalidArgument, match=r"^address is "):
+        SlipStream(url, np.zeros((2, 2, 3)), 1e-6)

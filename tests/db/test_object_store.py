@@ -12,6 +12,7 @@ import pytest
 
 from db.blobs import open_blobs
 from db.errors import BlobDamaged, DriverMissing, StorageUnavailable
+from db.object_store import SCHEMES, ObjectStore
 
 URL = "s3://grasps/lab"
 MIB = 2**20
@@ -168,3 +169,17 @@ def test_a_store_sees_its_own_blobs_and_not_those_of_one_in_a_folder_of_it(
     blobs.quarantine.delete([theirs])
     blobs.remove([theirs])
     assert set(s3.objects) == kept
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_library_knows_the_schemes_that_a_setting_may_have(
+    scheme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AZURE_STORAGE_ACCOUNT_NAME", "lab")
+    place = tmp_path if scheme == "file" else "grasps"
+    assert str(ObjectStore(f"{scheme}://{place}")) == f"{scheme}://{place}"
+
+
+def test_a_scheme_that_the_library_does_not_know_is_told_with_the_address() -> None:
+    with pytest.raises(StorageUnavailable, match=r'^blob store foo://x: .*Unable to recognise URL "foo://x"'):
+        ObjectStore("foo://x")

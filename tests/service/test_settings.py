@@ -214,6 +214,12 @@ def test_proxies_are_addresses_or_networks(text: str) -> None:
         ("webhook_url", "https://hooks.example:99999/a", "an http or https URL"),
         ("blob_url", "bucket", "s3://bucket/prefix and other URLs of obstore"),
         ("blob_url", "memory:///", "s3://bucket/prefix and other URLs of obstore"),
+        ("blob_url", "foo://x", "'foo://x'; allowed: s3://bucket/prefix and other URLs of obstore, of s3, s3a, gs, "),
+        ("database_url", "mysql://u:hush@host/x", "'mysql://u:***@host/x'; allowed: a SQLAlchemy URL that begins with"),
+        ("database_url", "postgres://host/x", "begins with sqlite:// or postgresql:// (docs"),
+        ("database_url", "mysql://u:a@hush@host/x", "is not one that is allowed; allowed: a SQLAlchemy URL"),
+        ("database_url", "mysql://host/x?password=hush", "is not one that is allowed; allowed: a SQLAlchemy URL"),
+        ("database_url", "hush", "is not one that is allowed; allowed: a SQLAlchemy URL"),
     ],
 )
 def test_an_address_that_cannot_be_is_refused_with_what_may_be(name: str, value: str, allowed: str) -> None:
@@ -223,6 +229,7 @@ def test_an_address_that_cannot_be_is_refused_with_what_may_be(name: str, value:
     assert told.startswith(f"STICTION_{name.upper()} is ")
     assert allowed in told
     assert told.endswith("(docs/settings.md)")
+    assert "hush" not in told
 
 
 @pytest.mark.parametrize(
@@ -233,6 +240,7 @@ def test_an_address_that_cannot_be_is_refused_with_what_may_be(name: str, value:
         ("blob_url", "s3://bucket/prefix"),
         ("database_url", "sqlite:////data/a.sqlite3"),
         ("database_url", "postgresql://host/stiction"),
+        ("database_url", "postgresql+psycopg://host/stiction"),
     ],
 )
 def test_an_address_is_kept_as_it_was_given(name: str, value: str) -> None:
