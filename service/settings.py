@@ -15,6 +15,7 @@ from sqlalchemy.exc import ArgumentError
 
 from db.database import SCHEMES
 from db.object_store import SCHEMES as BLOB_SCHEMES
+from service.ranges import range_at
 
 MIB = 2**20
 
@@ -268,11 +269,4 @@ def _without_password(url: str) -> str | None:
 
 def _range(name: str) -> str | None:
     """What a setting that is a number may be, both ends of it; None of any other."""
-    schema = Settings.model_json_schema()["properties"].get(name, {})
-    parts = [part for part in schema.get("anyOf", [schema]) if "maximum" in part]
-    if not parts:
-        return None
-    (number,) = parts
-    low = f"{number['minimum']}" if "minimum" in number else f"above {number['exclusiveMinimum']}"
-    whole = "whole " if number["type"] == "integer" else ""
-    return f"a {whole}number, {low} to {number['maximum']}"
+    return range_at(Settings.model_json_schema(), (name,))

@@ -19,6 +19,7 @@ from service.domain import errors
 from service.domain.errors import DomainError, InsufficientScope
 from service.domain.logs.damage import record_damage
 from service.http.access import CHALLENGE_OF_INVALID_KEY, challenge_of_scope
+from service.http.fair_route import FairRoute
 from service.http.idempotency import KEY_PATTERN, KEY_RULE
 from service.http.problems import (
     BAD_REQUEST,
@@ -61,6 +62,7 @@ from service.http.problems import (
 from service.http.schemas.common import NAME_PATTERN, NAME_RULE
 from service.http.schemas.owners import OWNER_PATTERN, OWNER_RULE
 from service.processes.fair_queue import QueueFull
+from service.ranges import range_at
 
 logger = logging.getLogger(__name__)
 
@@ -104,6 +106,12 @@ WORDS_OF_KIND = {
 
 BOUNDS = frozenset({"greater_than", "greater_than_equal", "less_than", "less_than_equal"})
 """Types of the framework's errors that NaN has, too, which is not to be taken for a number beyond a bound."""
+
+OF_NUMBERS = BOUNDS | {
+    *("float_parsing", "float_type", "finite_number"),
+    *("int_parsing", "int_parsing_size", "int_type", "int_from_float"),
+}
+"""Types of its errors about what is to be a number; it tells the bound that was passed, and not the other."""
 
 _UNKNOWN = {
     "material": UNKNOWN_MATERIAL,
@@ -191,10 +199,19 @@ async def _on_queue_full(request: Request, error: Exception) -> JSONResponse:
 
 async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    wrong = [_wrong_value(entry) for entry in error.errors()[:MOST_TOLD]]
+    wrong = [_wrong_value(_with_range(request, entry)) for entry in error.errors()[:MOST_TOLD]]
     listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
     wrong[0].more["errors"] = listed
     return problem_response(request, wrong[0])
+
+
+def _with_range(request: Request, entry: dict[str, Any]) -> dict[str, Any]:
+    """The error with the whole range of what is to be a number, where the route tells it."""
+    route = request.scope.get("route")
+    if entry["type"] not in OF_NUMBERS or not isinstance(route, FairRoute):
+        return entry
+    place, *path = entry["loc"]
+    return {"range": range_at(route.schema_of(place), tuple(path)), **entry}
 
 
 def _wrong_value(entry: dict[str, Any]) -> Problem:
@@ -220,6 +237,8 @@ def _allowed(entry: dict[str, Any]) -> str:
         return WORDS_OF_KIND[kind].format(**ctx)
     if kind == "string_pattern_mismatch":
         return RULE_OF_PATTERN.get(ctx["pattern"], f"text that matches {ctx['pattern']}").removesuffix(".")
+    if kind in OF_NUMBERS and entry.get("range") is not None:
+        return str(entry["range"])
     allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     allowed = re.sub(r"0\.0{4,}\d+", lambda small: f"{float(small[0]):g}", allowed)
     allowed = allowed.partition(", unable to ")[0]

@@ -12,7 +12,8 @@ from fastapi.routing import APIRoute
 from service.domain.resources.receive import unless_gone
 from service.http.access import CurrentPrincipal
 from service.http.dependencies import CurrentContext
-from service.http.parameters import KNOWN_PARAMETERS, query_parameters
+from service.http.parameters import KNOWN_PARAMETERS, query_parameters, schema_of
+from service.ranges import Schema
 
 
 async def gone(request: Request) -> None:
@@ -46,6 +47,13 @@ class FairRoute(APIRoute):
             needed.append(Depends(_turn, scope="function"))
         super().__init__(path, endpoint, dependencies=needed, **options)
         self.parameters = query_parameters(self)
+        self._schemas: dict[str, Schema] = {}
+
+    def schema_of(self, place: str) -> Schema:
+        """The JSON schema of what the route takes in a place ("body", "query", "path"), made when it is asked for."""
+        if place not in self._schemas:
+            self._schemas[place] = schema_of(self, place)
+        return self._schemas[place]
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler, which of a coroutine without a body is given up once its client has gone."""

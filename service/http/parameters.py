@@ -2,15 +2,17 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 from fastapi import Depends, Request
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.params import Cookie, Header, Path
 from fastapi.routing import APIRoute
+from pydantic import TypeAdapter
 
 from service.domain.errors import shown
 from service.http.problems import INVALID_REQUEST, Problem
+from service.ranges import Schema
 
 ELSEWHERE = (Path, Header, Cookie)
 """What is no parameter of the address's query."""
@@ -47,6 +49,22 @@ def query_parameters(route: APIRoute) -> dict[str, bool]:
     """Names of the parameters that a route takes in its address, and whether they are numbers."""
     taken = (each for each in get_flat_params(route.dependant) if not isinstance(each.field_info, ELSEWHERE))
     return numbers_among((each.alias, each.field_info.annotation) for each in taken)
+
+
+def schema_of(route: APIRoute, place: str) -> Schema:
+    """The JSON schema of a route's body, or of its parameters in a "path" or "query"; an empty one of what has none."""
+    if place == "body":
+        return {} if route.body_field is None else _schema(route.body_field.field_info.annotation)
+    schema: dict[str, Any] = {"properties": {}, "$defs": {}}
+    for field in {"path": route.dependant.path_params, "query": route.dependant.query_params}.get(place, ()):
+        own = _schema(Annotated[field.field_info.annotation, field.field_info])
+        schema["$defs"] |= own.get("$defs", {})
+        schema["properties"] |= own.get("properties", {field.alias: own})  # a model of parameters has its own
+    return schema
+
+
+def _schema(kind: Any) -> dict[str, Any]:
+    return TypeAdapter(kind).json_schema()
 
 
 def _parts(kind: Any) -> Iterable[Any]:

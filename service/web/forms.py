@@ -20,6 +20,7 @@ from service.domain.errors import UploadInterrupted, shown
 from service.domain.resources.context import Context
 from service.http.bodies import MOST_FIELDS, limited, media_type
 from service.http.fair_route import FairRoute
+from service.ranges import range_at
 
 Shape = TypeVar("Shape", bound=BaseModel)
 
@@ -145,17 +146,20 @@ def _check_charset(content_type: str) -> None:
 
 def checked(shape: type[Shape], fields: Mapping[str, str]) -> Shape:
     """What was sent, in the API's own shape and bounds; raises ``RequestValidationError``."""
-    return _checked(shape.model_validate_strings, {name: text for name, text in fields.items() if text != ""})
+    return _checked(shape, shape.model_validate_strings, {name: text for name, text in fields.items() if text != ""})
 
 
 def revised(shape: type[Shape], values: Mapping[str, Any]) -> Shape:
     """What was sent beside what is kept, alike."""
-    return _checked(shape.model_validate, dict(values))
+    return _checked(shape, shape.model_validate, dict(values))
 
 
-def _checked(validate: Callable[[Any], Shape], values: Mapping[str, Any]) -> Shape:
+def _checked(shape: type[Shape], validate: Callable[[Any], Shape], values: Mapping[str, Any]) -> Shape:
     try:
         return validate(values)
     except ValidationError as error:
-        wrong = [{**each, "loc": ("form", *each["loc"])} for each in error.errors()]
+        schema = shape.model_json_schema()
+        wrong = [
+            {**each, "range": range_at(schema, each["loc"]), "loc": ("form", *each["loc"])} for each in error.errors()
+        ]
         raise RequestValidationError(wrong) from error

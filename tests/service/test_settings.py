@@ -182,8 +182,8 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
     [
         ("STICTION_PORT", "eighty", "a whole number, 0 to 65535"),
         ("STICTION_LOOKUP_PORT", "99999", "a whole number, 0 to 65535"),
-        ("STICTION_LEASE_SECONDS", "0", "a number, 0.5 to 600.0"),
-        ("STICTION_IDEMPOTENCY_HOURS", "0", "a number, above 0.0 to 8760.0"),
+        ("STICTION_LEASE_SECONDS", "0", "a number, 0.5 to 600"),
+        ("STICTION_IDEMPOTENCY_HOURS", "0", "a number, above 0 to 8760"),
     ],
 )
 def test_of_a_number_both_ends_of_its_range_are_told(

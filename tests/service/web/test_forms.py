@@ -11,6 +11,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from fastapi.exceptions import RequestValidationError
 from starlette.datastructures import UploadFile
 from starlette.formparsers import MultiPartParser
 
@@ -18,6 +19,7 @@ from estimators.method_names import METHODS
 from service.domain.uploads import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
+from service.http.schemas.planning import NewGraspForce
 from service.web import forms
 from service.web.routes.planning import further_warning
 from slipcore import GraspLog
@@ -349,3 +351,14 @@ def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(
     files = {"file": ("log.npz", b"x" * 100)}
     answer = browser.request("POST", "/upload", files=files, headers=OWN)
     assert answer.status_code == 503
+
+
+def test_a_form_tells_both_ends_of_a_range_as_the_api_does() -> None:
+    fields = {"material": "paper", "tangential_load": "-1", "contact_area": "large"}
+    with pytest.raises(RequestValidationError) as refused:
+        forms.checked(NewGraspForce, fields)
+    told = {each["loc"]: each["range"] for each in refused.value.errors()}
+    assert told == {
+        ("form", "tangential_load"): "a number, 0 to 1e6",
+        ("form", "contact_area"): "a number, 1e-12 to 1",
+    }

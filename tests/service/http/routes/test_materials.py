@@ -197,6 +197,32 @@ def test_a_question_that_cannot_be_is_refused_by_name(client: httpx.Client, quer
     assert problem["allowed"]
 
 
+@pytest.mark.parametrize(
+    ("query", "told"),
+    [
+        ({"fn": -1}, "fn is -1; allowed: a number, 0 to 10000"),
+        ({"fn": "1e5"}, "fn is 1e5; allowed: a number, 0 to 10000"),
+        ({"fn": "nan"}, "fn is nan; allowed: a number, 0 to 10000"),
+        ({"fn": 0.1, "quantile": "low"}, "quantile is low; allowed: a number, 1e-12 to 0.999999999999"),
+        ({"fn": 0.1, "elements": 0}, "elements is 0; allowed: a whole number, 1 to 1000000000"),
+        ({"fn": 0.1, "elements": 1.5}, "elements is 1.5; allowed: a whole number, 1 to 1000000000"),
+    ],
+)
+def test_both_ends_of_a_range_are_told(client: httpx.Client, query: dict[str, Any], told: str) -> None:
+    assert client.get("/v1/materials/fitted/friction", params=query).json()["detail"] == told
+
+
+def test_both_ends_of_a_range_are_told_of_bodies_and_lists(client: httpx.Client) -> None:
+    asked = {"material": "fitted", "tangential_load": 1e7, "contact_area": True, "fingers": 0}
+    told = client.post("/v1/grasp-force", json=asked).json()["errors"]
+    assert {each["name"]: each["allowed"] for each in told} == {
+        "tangential_load": "a number, 0 to 1e6",
+        "contact_area": "a number, 1e-12 to 1",
+        "fingers": "a whole number, 1 to 100",
+    }
+    assert "limit is 1001; allowed: a whole number, 1 to 1000" in client.get("/v1/jobs?limit=1001").text
+
+
 def test_a_fit_on_request_is_a_new_current_version(client: httpx.Client, fitted: dict[str, Any], wait: Wait) -> None:
     before = client.get("/v1/materials/fitted/fits", params={"method": "bayes"}).json()["items"]
     asked = client.post("/v1/materials/fitted/fits", json={"method": "bayes", "seed": 3})
