@@ -58,6 +58,7 @@ def upload(
     json: Json = False,
 ) -> None:
     """Upload grasp logs and wait until their slip is detected and the material's model is fitted."""
+    from stiction_client import StictionError
 
     if create and material is None:
         raise typer.BadParameter("--create needs --material")
@@ -66,12 +67,14 @@ def upload(
         if create and material is not None:
             client.ensure_material(material)
         asked = material, sensor, detector
-        results = list(counted((_upload(client, each, wait, asked) for each in sources), len(sources), "logs"))
-    if json:
-        print_json({"uploads": results})
-    else:
-        columns = ("file", "grasp_log", "status", "reason", "model_version")
-        print_table("Uploads", columns, [[result.get(column) for column in columns] for result in results])
+        results: list[dict[str, Any]] = []
+        try:
+            sent = (_upload(client, each, wait, asked) for each in sources)
+            results.extend(counted(sent, len(sources), "logs"))  # those before an error stay
+        except (StictionError, KeyboardInterrupt):
+            _print_broken_off(results, sources, json)
+            raise
+    _print_uploads(results, json)
     raise typer.Exit(max(CODE_OF_STATUS.get(result["status"], 0) for result in results))
 
 
@@ -251,6 +254,26 @@ def _upload(
         typer.echo(f"{source.name}: {finding.name}: {finding.evidence}; {finding.remedy}", err=True)
     outcome = {**asdict(job), "findings": [asdict(each) for each in findings]}
     return {"file": source.name, "grasp_log": receipt.id, **outcome}
+
+
+def _print_uploads(results: list[dict[str, Any]], json: bool) -> None:
+    if json:
+        print_json({"uploads": results})
+    else:
+        columns = ("file", "grasp_log", "status", "reason", "model_version")
+        print_table("Uploads", columns, [[result.get(column) for column in columns] for result in results])
+
+
+def _print_broken_off(done: list[dict[str, Any]], sources: list[Source], json: bool) -> None:
+    """What became of each log where an error or Ctrl-C ended the uploads, and how to go on; nothing of a first one."""
+    if not done:
+        return
+    under_way, *others = [source.name for source in sources[len(done) :]]
+    left = [{"file": under_way, "status": "not known", "reason": "it may have been sent"}]
+    left += [{"file": name, "status": "not sent"} for name in others]
+    _print_uploads(done + left, json)
+    again = "the same command sends the rest, and stores none twice"
+    typer.echo(f"{len(done)} of {len(sources)} logs are done; {again}", err=True)
 
 
 def _middle_force(model: "FrictionModel") -> float:

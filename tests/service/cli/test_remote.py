@@ -15,11 +15,19 @@ from typer import BadParameter
 
 import stiction_client
 from service.cli import jobs, logs, main, materials, owners, remote, sensors, simulation, streaming
-from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
+from service.cli.exit_codes import FAILURE, INPUT_REFUSED, INTERRUPTED, SERVICE_REFUSED
 from service.cli.local import fit
 from slipcore import InvalidInput
 from slipcore.contact import simulate
-from stiction_client import FrictionClient, NoModel, ProblemError, RequiredForce, grasp, required_normal_force
+from stiction_client import (
+    ConnectionFailed,
+    FrictionClient,
+    NoModel,
+    ProblemError,
+    RequiredForce,
+    grasp,
+    required_normal_force,
+)
 from stiction_client.records import FrictionAnswer, Material, NextGrasp, Withdrawal
 from stiction_client.stream import SlipStream
 from tests.service.report.test_material import JOB, LOG, MODEL, SEEN
@@ -372,3 +380,37 @@ def test_an_area_as_large_as_a_hand_is_taken_without_asking(monkeypatch: pytest.
     remote._check_area(0.02)
     with pytest.raises(BadParameter, match=r"--contact-area is 0\.0201 m²; allowed: that of one finger, such as 1e-4"):
         remote._check_area(0.0201)
+
+
+@pytest.mark.parametrize(
+    ("end", "code"), [(ConnectionFailed("refused"), SERVICE_REFUSED), (KeyboardInterrupt(), INTERRUPTED)]
+)
+def test_uploads_that_break_off_say_what_is_done_and_how_to_go_on(
+    client: Mock, tmp_path: Path, capsys: pytest.CaptureFixture[str], end: BaseException, code: int
+) -> None:
+    paths = [tmp_path / f"{name}.npz" for name in "abcd"]
+    for path in paths:
+        path.touch()
+    receipt = Mock(id="1f", job=JOB)
+    for shown in ([], ["--json"]):
+        client.upload.side_effect, client.wait.return_value = [receipt, receipt, end], JOB
+        client.grasp_log.return_value = Mock(detection=None)
+        with pytest.raises(SystemExit) as left:
+            main(["upload", *map(str, paths), *shown])
+        assert left.value.code == code
+        out, err = capsys.readouterr()
+        assert "2 of 4 logs are done; the same command sends the rest, and stores none twice" in err
+    told = json.loads(out)["uploads"]
+    assert [each["status"] for each in told] == [JOB.status, JOB.status, "not known", "not sent"]
+    assert [each["file"] for each in told] == [path.name for path in paths]
+
+
+def test_a_first_upload_that_fails_says_no_more_than_why(
+    client: Mock, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.npz").touch()
+    client.upload.side_effect = ConnectionFailed("refused")
+    with pytest.raises(SystemExit):
+        main(["upload", str(tmp_path / "a.npz")])
+    out, err = capsys.readouterr()
+    assert (out, "refused" in err, "logs are done" in err) == ("", True, False)
