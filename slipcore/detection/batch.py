@@ -44,7 +44,10 @@ def detect_slip(
     for a log of another lattice than the sensor model's.
     """
     if not log.sees_along_surface:
-        allowed = "x and y of it, too: what moves along the normal alone shows neither slip nor friction"
+        allowed = (
+            "x and y of it, too, as of markers. Heights alone show neither slip nor friction, but forces along the "
+            "normal, by the sensor's gel: slipcore.forces.reconstruct (docs/forces.md#from-depth-alone)"
+        )
         raise InvalidInput("displacement", log.metadata["displacement"], allowed)
     if method == DEFAULT_METHOD and not log.has_displacement:
         method = FORCES_METHOD

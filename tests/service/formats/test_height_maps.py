@@ -264,5 +264,9 @@ def test_flat_maps_of_json_need_their_rows_and_columns(tmp_path: Path) -> None:
 def test_slip_is_not_looked_for_in_height_alone(tmp_path: Path) -> None:
     """Nothing would seem to slip."""
     log = formats.read(file_of(tmp_path, np.stack([CURVED, CURVED]), {}))
-    with pytest.raises(InvalidInput, match="displacement is along the normal; allowed: x and y of it"):
+    allowed = (
+        r"allowed: x and y of it, .* but forces along the normal, .*: slipcore.forces.reconstruct \(docs/forces.md#"
+    )
+    with pytest.raises(InvalidInput, match=f"displacement is along the normal; {allowed}from-depth-alone"):
         detect_slip(log)
+    assert "\n## From depth alone\n" in (Path(__file__).parents[3] / "docs/forces.md").read_text(encoding="utf-8")
