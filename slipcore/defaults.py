@@ -261,6 +261,19 @@ class SaturationDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GrossSlipDefaults(Options):
+    """When a contact slips as a whole, though some of its elements are taken to stick (``gross_slip.py``)."""
+
+    sticking: Annotated[float, Option(0.0, 1.0, "-", "as `together`; in a sphere's contact 91 % of the load")] = 0.2
+    """Of the elements in contact, the largest share that may seem to stick."""
+    together: Annotated[
+        float,
+        Option(0.0, 1.0, "-", "160 scenes of another phrase; in a sphere's contact 99 % of the load that it bears"),
+    ] = 0.05
+    """Of the elements in contact, the largest share that may seem to stick beside another one that does."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PatchDefaults(Options):
     """What no user needs to choose of contact patches (``patch/``)."""
 
@@ -322,6 +335,7 @@ NUMERICS = NumericsDefaults()
 RECONSTRUCTED_FORCES = ReconstructedForcesDefaults()
 MARKERS = MarkerDefaults()
 SATURATION = SaturationDefaults()
+GROSS_SLIP = GrossSlipDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
 TABLES = (
@@ -333,6 +347,7 @@ TABLES = (
     NUMERICS,
     MARKERS,
     SATURATION,
+    GROSS_SLIP,
     PATCHES,
     COLLECTION,
 )

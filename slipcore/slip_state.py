@@ -28,8 +28,9 @@ class SlipState:
 
     ``contact``, ``slip`` [n, m] bool; ``probability`` of slip [n, m]; ``stick_ratio``: stick area over contact area
     (paper, eq. 37 corrected), NaN without contact; ``velocity`` [n, m, 2] m/s, tangential velocity of the surface
-    relative to the object, NaN where it is unobservable; ``macro_slip``: no element in contact sticks; ``observed``
-    [n, m], or None for all: of an element that was not, nothing is known, as if it did not touch.
+    relative to the object, NaN where it is unobservable; ``macro_slip``: the contact slips as a whole, no zone of it
+    sticks (``gross_slip.py``); ``observed`` [n, m], or None for all: of an element that was not, nothing is known, as
+    if it did not touch.
     """
 
     time: float
@@ -43,6 +44,8 @@ class SlipState:
 
     def masked(self, observed: BoolArray, throughout: BoolArray) -> "SlipState":
         """The state without the elements [n, m] that were not ``observed``, nor velocity where not ``throughout``."""
+        from slipcore.gross_slip import is_gross_slip  # compiled: who only reports slip goes without
+
         contact, slip = self.contact & observed, self.slip & observed
         return SlipState(
             self.time,
@@ -51,7 +54,7 @@ class SlipState:
             np.where(observed, self.probability, 0.0),
             stick_ratio(contact, slip),
             np.where(throughout[..., None], self.velocity, np.nan),
-            macro_slip=bool(contact.any()) and not (contact & ~slip).any(),
+            macro_slip=is_gross_slip(contact, slip),
             observed=observed,
         )
 
@@ -109,6 +112,8 @@ class SlipHistory:
         """
         if self.observed is None:
             return self
+        from slipcore.gross_slip import find_gross_slip  # compiled, as above
+
         seen = _of_neighbours(self.observed.astype(float))
         touching = _of_neighbours((self.contact & self.observed).astype(float))
         slipping = _of_neighbours(np.where(self.contact & self.observed, self.probability, 0.0))
@@ -124,7 +129,7 @@ class SlipHistory:
             slip=slip,
             probability=np.where(touches, mean, self.probability),
             stick_ratio=ratio,
-            macro_slip=self.macro_slip & ~(contact & ~slip).any(axis=(1, 2)),
+            macro_slip=self.macro_slip & find_gross_slip(contact, slip),
         )
 
     @property

@@ -47,6 +47,7 @@ from slipcore.frames import (
     check_normal,
     check_pose,
 )
+from slipcore.gross_slip import is_gross_slip
 from slipcore.slip_state import SlipState
 from slipcore.surface.log_normals import normals_of_shape
 from slipcore.surface.strain import Lattice
@@ -185,8 +186,8 @@ def slip_state(time: float, memory: Memory, velocity: FloatArray, touching: int,
         read_only(memory.slip),
         read_only(memory.probability),
     )
-    macro_slip = 0 < touching == slipping
-    return SlipState(time, contact, slip, probability, ratio, read_only(velocity), macro_slip=macro_slip)
+    macro_slip = is_gross_slip(contact, slip)
+    return SlipState(time, contact, slip, probability, ratio, read_only(velocity), macro_slip)
 
 
 def masked(now: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:

@@ -12,6 +12,7 @@ from slipcore.detection.methods import findings_by
 from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, workspace
 from slipcore.detection.sharpening import sharpened
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.gross_slip import find_gross_slip
 from slipcore.slip_state import SlipHistory, slip_events
 
 
@@ -67,8 +68,7 @@ def _history(log: GraspLog, method: str, noise: float, results: FrameResults) ->
     ratio = np.full(len(log), np.nan)
     np.divide(slipping, touching, out=ratio, where=touching > 0)
     events = slip_events(log.time, contact, slip, log.observed)
-    macro_slip = (touching > 0) & (touching == slipping)
-    fields = contact, slip, probability, 1.0 - ratio, velocity, macro_slip
+    fields = contact, slip, probability, 1.0 - ratio, velocity, find_gross_slip(contact, slip)
     return SlipHistory(log.time, *fields, events, noise, method, log.observed)
 
 

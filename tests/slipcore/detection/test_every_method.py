@@ -24,6 +24,7 @@ from slipcore.defaults import DEFAULT_METHOD, ContactOptions
 from slipcore.detection.batch import with_patches
 from slipcore.detection.detector import init, step
 from slipcore.detection.shared.interface import Decision, Method, ObservedFrame
+from slipcore.gross_slip import find_gross_slip
 from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.surface.strain import Lattice
 from tests.slipcore.conftest import RECORDED
@@ -140,9 +141,8 @@ def check_invariants(log: GraspLog, history: SlipHistory) -> None:
     assert ((history.probability >= 0.0) & (history.probability <= 1.0)).all()
     assert not history.probability[~history.contact].any()
     np.testing.assert_array_equal(np.isnan(history.stick_ratio), ~touching)
-    sticking = (history.contact & ~history.slip).any(axis=(1, 2))
-    of_patches = slips_as_a_whole(history.patches, len(log))
-    np.testing.assert_array_equal(history.macro_slip, (touching & ~sticking) | of_patches)
+    of_elements = find_gross_slip(history.contact, history.slip)
+    np.testing.assert_array_equal(history.macro_slip, of_elements | slips_as_a_whole(history.patches, len(log)))
     touched = history.contact[1:] & ~history.contact[:-1]
     assert not (history.slip[1:] & touched).any()
     known = np.isfinite(history.velocity).all(axis=-1)
