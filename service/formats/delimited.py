@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
 
 DELIMITERS = ",;\t"
+DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:e[+-]?\d+)?\s*", re.IGNORECASE)
+"""A number of a table that is parted by semicolons, as spreadsheets of many languages write it."""
 
 
 def text_lines(path: Path) -> Iterator[str]:
@@ -45,10 +48,14 @@ def rows(lines: Iterator[str], delimiter: str, width: int, before: int, most: in
                 raise InvalidInput("file", f"more than {most} rows", f"at most {most} rows")
             if len(cells) != width:
                 raise InvalidInput(f"line {line}", f"of {len(cells)} cells", f"{width}, as in the header")
-            yield line, cells
+            yield line, [_with_point(cell) for cell in cells] if delimiter == ";" else cells
     except csv.Error as error:
         line = before + reader.line_num
         raise InvalidInput(f"line {line}", f"not a row of text ({error})", "delimited text") from error
+
+
+def _with_point(cell: str) -> str:
+    return cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell
 
 
 def parse_number(

@@ -32,6 +32,8 @@ SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
 """m per pixel (1 where the file is in metres) and frames a second that can be."""
 ASSUMED_WIDTH = 15e-3
 """m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
+COUNTS_FRAMES = "1/s, because the file counts frames (--frame-rate 30, or a line `# frame_rate: 30` before its header)"
+"""What is said where a rate is missing."""
 MAX_ROWS, ROW = 5_000_000, 11
 """Rows of a file, and numbers that are kept of each."""
 
@@ -177,7 +179,7 @@ def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -
     table, names = _table(header, lines)
     moment, line = table[:, 0], table[:, -1]
     if "time" not in header.columns:
-        moment = moment / _setting("frame_rate", settings, FRAME_RATE, "1/s, because the file counts frames")
+        moment = moment / _setting("frame_rate", settings, FRAME_RATE, COUNTS_FRAMES)
     time, frame = np.unique(moment, return_inverse=True)
     marker = table[:, 1].astype(np.intp)
     _check_size(len(time), len(names))
@@ -306,6 +308,7 @@ def _grasp_log(
     if "scale" in settings:
         scale = _setting("scale", settings, SCALE, "m per pixel")
         metadata["scale"] = f"{scale:g} m per pixel"
+        _check_extent(at, scale)
     else:
         scale = ASSUMED_WIDTH / max(float(np.ptp(at[:, :2], axis=0).max()), 1e-300)
         metadata |= {"scale": "unknown", "assumed_scale": f"{scale:.6g} m per pixel"}
@@ -331,6 +334,14 @@ def _grasp_log(
         metadata = {**log.metadata, "contact": BY_MOTION}
         log = replace(log, contact=contact_by_motion(log.time, log.displacement), metadata=metadata)
     return _with_gripper(log, tracks.gripper_force, settings)
+
+
+def _check_extent(at: FloatArray, scale: float) -> None:
+    """Most who give mm in place of m are refused so: their sensor would be as large as a room."""
+    extent = scale * float(np.abs(at).max())
+    if extent > LIMITS.position:
+        wrong = f"{scale:g} m per pixel, by which markers lie up to {extent:.3g} m from the origin"
+        raise InvalidInput("scale", wrong, f"one by which they lie within {LIMITS.position:g} m (is it in m?)")
 
 
 def _rest(tracks: Tracks, chosen: str, places: Mapping[str, FloatArray] | None) -> tuple[FloatArray, str]:

@@ -17,11 +17,15 @@ from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.sharpening import kernels_of, smoothing_found
 from slipcore.detection.whole_log import history_of
 from slipcore.errors import InvalidInput
+from slipcore.finding import Finding
 from slipcore.frames import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
 from slipcore.surface.log_normals import with_normals
+
+LENGTHS = frozenset({"rounded", "lasting noise", "smoothed"})
+"""Findings whose evidence is a length in m."""
 
 
 def detect_slip(
@@ -65,7 +69,8 @@ def detect_slip(
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         history = history_of(log, state, checked_lookahead(lookahead))
-        history = replace(history, findings=mended + history.findings + smoothing_found(estimated))
+        found = mended + history.findings + smoothing_found(estimated)
+        history = replace(history, findings=_in_its_units(found, log))
         return with_patches(log, history, kernel_width=kernel_width)
     smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
@@ -73,10 +78,15 @@ def detect_slip(
         if (settled := smoother.take(state, now)) is not None:
             settled_states.append(settled)
     history = collect_history([*settled_states, *smoother.rest()], state)
-    history = replace(history, findings=mended + history.findings)
+    history = replace(history, findings=_in_its_units(mended + history.findings, log))
     if not log.has_displacement:
         history = replace(history, velocity=np.full_like(history.velocity, np.nan))
     return with_patches(log, history, kernel_width=kernel_width)
+
+
+def _in_its_units(found: tuple[Finding, ...], log: GraspLog) -> tuple[Finding, ...]:
+    """Without those that give lengths where the log's scale is unknown."""
+    return found if log.is_scaled else tuple(each for each in found if each.name not in LENGTHS)
 
 
 def with_patches(log: GraspLog, history: SlipHistory, **options: float) -> SlipHistory:
@@ -155,5 +165,5 @@ def collect_history(slip_states: Sequence[SlipState], state: DetectorState) -> S
     noise, method = state.noise, state.setup.method
     return SlipHistory(
         time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed,
-        findings=findings_by(method, state.memory.common, state.of_method),
+        findings=findings_by(method, state.memory.common, noise, state.of_method),
     )  # fmt: skip

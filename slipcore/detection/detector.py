@@ -231,7 +231,7 @@ class SlipDetector:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What was found inconsistent in the frames so far."""
-        return findings_by(self.state.setup.method, self.state.memory.common, self.state.of_method)
+        return findings_by(self.state.setup.method, self.state.memory.common, self.noise, self.state.of_method)
 
     def set_options(self, **options: float) -> None:
         """Go on with other ``options`` from the next frame on; those not named stay. Raises ``InvalidInput``."""

@@ -34,12 +34,15 @@ METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
 """A further method joins by a file of its own, or a room if it has several, and a line here."""
 
 
-def findings_by(name: str, common: FloatArray, of_method: Any = None) -> tuple[Finding, ...]:
-    """What the method of that name found inconsistent, from its memory's ``common``, or from its own state."""
+def findings_by(name: str, common: FloatArray, noise: float, of_method: Any = None) -> tuple[Finding, ...]:
+    """What the method of that name found inconsistent, from its memory's ``common``, or from its own state.
+
+    ``noise``: estimated standard deviation of one marker coordinate, m; NaN where it is unknown.
+    """
     method = find_method(name)
     if method.findings is None:
         return ()
-    return method.findings(common if isinstance(method, CompiledMethod) else of_method)
+    return method.findings(common if isinstance(method, CompiledMethod) else of_method, noise)
 
 
 def find_method(name: str) -> Method[Any, Any] | CompiledMethod[Any]:

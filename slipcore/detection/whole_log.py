@@ -31,7 +31,7 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     displacement, force = sharpened(log.displacement, log.force, setup.options, setup.element_area)
     recording = _recording(log, displacement, force)
     noise = fold(is_filter, setup.sensor, recording, rings, ahead, room, results)
-    found = findings_by(setup.method, rings.common[(len(log) - 1) % 2])
+    found = findings_by(setup.method, rings.common[(len(log) - 1) % 2], noise)
     return replace(_history(log, setup.method, noise, results), findings=found)
 
 

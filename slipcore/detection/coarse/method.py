@@ -113,9 +113,9 @@ def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
     return DetectorSetup(*for_setup(lattice), touch, touch, settings)
 
 
-def findings(state: CoarseState) -> tuple[Finding, ...]:
+def findings(state: CoarseState, noise: float) -> tuple[Finding, ...]:
     """What the filter found inconsistent."""
-    return by_place.findings(state.memory.common)
+    return by_place.findings(state.memory.common, noise)
 
 
 METHOD = Method(CoarseOptions, init, step, findings)

@@ -49,8 +49,11 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
     return decision
 
 
-def findings(common: FloatArray) -> tuple[Finding, ...]:
-    """Forces that are not believed, and noise of markers that three frames do not show."""
+def findings(common: FloatArray, noise: float) -> tuple[Finding, ...]:
+    """Forces that are not believed, and noise of markers that three frames do not show.
+
+    Rounding by less than the ``noise`` of a marker's coordinate (m, NaN: unknown) hides nothing, and is not reported.
+    """
     found, frames, doubted = [], round(common[FORCE_FRAMES]), round(common[DOUBTED_FRAMES])
     if doubted:
         evidence = (
@@ -59,10 +62,11 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
         )
         remedy = "give the force of the object on the sensor, in its frame, as it is at the frame's time"
         found.append(Finding("forces not believed", evidence, remedy))
-    if common[RESOLUTION] > 0.0:
-        evidence = f"all places of markers are multiples of {1e6 * common[RESOLUTION]:.3g} µm"
+    step = common[RESOLUTION]
+    if step > 0.0 and not step <= noise:
+        evidence = f"all places of markers are multiples of {1e6 * step:.3g} µm"
         found.append(Finding("rounded", evidence, "record places as finely as the tracker gives them"))
-    elif common[LASTING] > NOISE.lasting_told:
+    elif step == 0.0 and common[LASTING] > NOISE.lasting_told:
         evidence = (
             f"markers part from their neighbours by {1e6 * common[LASTING]:.3g} µm that lasts from frame to frame"
         )

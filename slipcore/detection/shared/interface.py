@@ -40,14 +40,15 @@ class ObservedFrame(NamedTuple):
 class Method(NamedTuple, Generic[State, Options]):
     """A detection method: its options, and pure functions on an immutable state of its own choosing.
 
-    ``init`` makes the state of a method that has seen nothing; ``step`` takes each frame; ``findings``: what its state
-    says is inconsistent in the frames so far, None for a method that does not look.
+    ``init`` makes the state of a method that has seen nothing; ``step`` takes each frame; ``findings``: what its state,
+    and the noise of a marker's coordinate (m), say is inconsistent in the frames so far; None for a method that does
+    not look.
     """
 
     options: type[Options]
     init: Callable[[Lattice, Options], State]
     step: Callable[[State, Lattice, ObservedFrame, Options], tuple[State, Decision]]
-    findings: Callable[[State], tuple[Finding, ...]] | None = None
+    findings: Callable[[State, float], tuple[Finding, ...]] | None = None
 
 
 class Start(NamedTuple):
@@ -62,12 +63,12 @@ class CompiledMethod(NamedTuple, Generic[Options]):
     """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
 
     ``revise``: the decision on a frame from the ``elements`` in its memory and in those of frames after it, and the
-    settings; None for a method to which later frames say nothing. ``findings``: what its memory's ``common`` says is
-    inconsistent in the frames so far; None for a method that does not look.
+    settings; None for a method to which later frames say nothing. ``findings``: what its memory's ``common``, and the
+    noise of a marker's coordinate (m), say is inconsistent in the frames so far; None for a method that does not look.
     """
 
     options: type[Options]
     start: Callable[[Lattice, Options], Start]
     run: Callable[..., tuple[float, int, int]]
     revise: Callable[[Sequence[FloatArray], FloatArray], Decision] | None = None
-    findings: Callable[[FloatArray], tuple[Finding, ...]] | None = None
+    findings: Callable[[FloatArray, float], tuple[Finding, ...]] | None = None

@@ -107,3 +107,19 @@ def test_a_definition_that_is_too_long_or_claims_too_much_is_refused(definition:
     with pytest.raises(InvalidInput, match=f"definition of a/msg/B is {len(definition)} characters; allowed: at most"):
         deserializer("a/B", definition, ros1=False)
     assert callable(deserializer("a/B", "float64[9999999] x\n#" + "x" * 100, ros1=False))
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "cell", "read"),
+    [
+        (";", "1,5", "1.5"),
+        (";", " -12,25e-3", " -12.25e-3"),
+        (";", "1,234,5", "1,234,5"),
+        (";", "a,b", "a,b"),
+        (";", "1.5", "1.5"),
+        ("\t", "1,5", "1,5"),
+    ],
+)
+def test_between_semicolons_numbers_may_have_a_decimal_comma(delimiter: str, cell: str, read: str) -> None:
+    ((_, cells),) = delimited.rows(iter([f"0{delimiter}{cell}\n"]), delimiter, 2, 0, 1)
+    assert cells == ["0", read]

@@ -163,9 +163,18 @@ def test_slip_is_found_without_a_scale_much_as_with_one() -> None:
     assert both / either > 0.8
 
 
+def test_a_scale_by_which_a_sensor_were_as_large_as_a_room_is_refused_by_name(write: Write) -> None:
+    """It had been the place of a marker that was refused."""
+    path = write(table())
+    with pytest.raises(InvalidInput, match=r"^scale is 0\.5 m per pixel, by which markers lie up to .*is it in m\?"):
+        formats.read(path, scale=0.5)
+
+
 def test_what_is_given_goes_before_what_the_file_says(write: Write) -> None:
     path = write(table(header="frame,marker,x,y", rows=[f"{round(10 * float(r[:3]))}{r[3:]}" for r in square()]))
-    with pytest.raises(InvalidInput, match=r"frame_rate is missing; allowed: .* because the file counts frames"):
+    with pytest.raises(
+        InvalidInput, match=r"frame_rate is missing; allowed: .* the file counts frames \(--frame-rate 30"
+    ):
         formats.read(path)
     log = formats.read(path, scale=5e-5, frame_rate=20.0)
     np.testing.assert_allclose(log.time, [0.0, 0.05, 0.1])

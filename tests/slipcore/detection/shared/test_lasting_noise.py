@@ -1,6 +1,7 @@
 """Noise that three frames do not show: what lasts from frame to frame, and rounding."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,21 @@ def test_slip_is_found_beside_noise_that_lasts(
     assert f1_score(log, history) > least
     assert history.noise > 2e-6
     assert {finding.name for finding in history.findings} & {"lasting noise", "rounded"}
+
+
+def test_rounding_below_the_noise_is_not_reported(scene: Scene) -> None:
+    """Places in pixels with three decimals are multiples of 30 nm: each table of markers had the finding."""
+    log = scene("cond1", marker_noise=2e-6, force_noise=2e-3)
+    for step, is_reported in ((3e-8, False), (1e-6, False), (1e-5, True)):
+        history = detect_slip(rounded(step)(log, np.random.default_rng(4)))
+        assert ("rounded" in {finding.name for finding in history.findings}) is is_reported, step
+
+
+def test_no_length_is_reported_of_a_log_without_a_scale(scene: Scene) -> None:
+    log = rounded(1e-5)(scene("cond1", marker_noise=2e-6), np.random.default_rng(4))
+    unscaled = replace(log, force=None, metadata={"scale": "unknown"})
+    assert not unscaled.is_scaled
+    assert detect_slip(unscaled).findings == ()
 
 
 def test_white_noise_is_not_taken_to_last(scene: Scene) -> None:
