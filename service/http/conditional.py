@@ -45,6 +45,11 @@ def tagged(request: Request, body: str) -> Response:
     return conditional(request, _tag(body), lambda: body)
 
 
+def changed(body: str) -> Response:
+    """The JSON ``body`` of what was changed, with the tag by which it may be changed again."""
+    return Response(body, 200, {"ETag": _tag(body)}, "application/json")
+
+
 def require_match(if_match: str | None, body: Callable[[], str]) -> None:
     """Raise ``Problem`` where the tag of a ``body`` that ``tagged`` answers with is none of ``If-Match``; a weak one is
     never its.

@@ -99,6 +99,10 @@ RULE_OF_PATTERN = {NAME_PATTERN: NAME_RULE, OWNER_PATTERN: OWNER_RULE, KEY_PATTE
 WORDS_OF_KIND = {
     "extra_forbidden": "no field of this name",
     "model_attributes_type": "a JSON object",
+    "string_type": "text",
+    "list_type": "a list",
+    "too_short": "{min_length} or more of them",
+    "too_long": "at most {max_length} of them",
     "string_too_short": "text of at least {min_length} character(s)",
     "string_too_long": "text of at most {max_length} characters",
 }
@@ -166,7 +170,7 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
     if kind in {INTERNAL_ERROR, FILE_MISSING}:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
-    known_by = "id" if kind in {UNKNOWN_GRASP_LOG, UNKNOWN_JOB} else "name"
+    known_by = {UNKNOWN_GRASP_LOG: "id", UNKNOWN_JOB: "id", UNKNOWN_CALIBRATION: "version"}.get(kind, "name")
     allowed = "its copy from a backup, put back" if kind is FILE_MISSING else f"the {known_by} of a stored {error.kind}"
     return problem_response(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
 
@@ -219,15 +223,20 @@ def _wrong_value(entry: dict[str, Any]) -> Problem:
         return Problem.wrong_value(INVALID_REQUEST, "body", f"not JSON ({entry['ctx']['error']})", "a JSON object")
     name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
     if entry["type"] == "missing":
-        return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
+        allowed = "a JSON object" if entry["loc"] == ("body",) else "a value"
+        return Problem.wrong_value(INVALID_REQUEST, name, "missing", allowed)
     return Problem.wrong_value(INVALID_REQUEST, name, _given(entry), _allowed(entry))
 
 
 def _given(entry: dict[str, Any]) -> object:
-    """The value; of a wrong kind, in a body, as JSON has it: "2" is text, and looks like a number without its marks."""
+    """The value; as JSON has it where it is empty text or has parts, and in a body where it is of a wrong kind: "2" is
+    text, and looks like a number without its marks.
+    """
     value = entry["input"]
     is_of_wrong_kind = entry["type"].endswith(("_type", "_parsing")) and entry["loc"][0] == "body"
-    return json.dumps(value, ensure_ascii=False) if is_of_wrong_kind and isinstance(value, str | bool | None) else value
+    shows_as_json = value == "" or isinstance(value, dict | list)
+    shows_as_json |= is_of_wrong_kind and isinstance(value, str | bool | None)
+    return json.dumps(value, ensure_ascii=False, default=str) if shows_as_json else value
 
 
 def _allowed(entry: dict[str, Any]) -> str:
@@ -253,6 +262,9 @@ async def _on_http_exception(request: Request, error: Exception) -> JSONResponse
     headers = dict(error.headers or {})
     if kind is METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed_methods(request))
+        refused = Problem.wrong_value(kind, "method", request.method, headers["Allow"])
+        refused.headers |= headers
+        return problem_response(request, refused)
     return problem_response(
         request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers)
     )

@@ -8,7 +8,7 @@ from db.records import Job, Material, StoredGraspLog
 from service.domain.materials import curate
 from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
-from service.http.conditional import IfMatch, require_match
+from service.http.conditional import IfMatch, changed, require_match
 from service.http.context import ServerContext
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
@@ -42,6 +42,7 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
     tags=["materials"],
     dependencies=[UPLOAD],
     summary="Rename or describe a material",
+    response_model=MaterialOut,
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, PRECONDITION_FAILED, QUOTA_EXCEEDED, *_BODY),
 )
 def change_material(
@@ -50,16 +51,18 @@ def change_material(
     change: MaterialChange,
     principal: CurrentPrincipal,
     if_match: IfMatch = None,
-) -> MaterialOut:
+) -> Response:
     """The old name becomes an alias, so that whoever knows it still finds the material.
 
-    With `If-Match`, the `ETag` of the material as it was read, only where it is still so.
+    With `If-Match`, the `ETag` of the material as it was read, only where it is still so; the answer has the
+    `ETag` of the material as it is now.
     """
 
     def check(before: Material) -> None:
         require_match(if_match, lambda: MaterialOut.of(before).model_dump_json())
 
-    return MaterialOut.of(curate.change(context, name, change.name, change.description, principal, check))
+    found = curate.change(context, name, change.name, change.description, principal, check)
+    return changed(MaterialOut.of(found).model_dump_json())
 
 
 @router.put(

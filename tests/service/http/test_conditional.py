@@ -54,6 +54,9 @@ def test_a_material_is_changed_only_where_it_is_as_it_was_read(reach: Any) -> No
         assert change("b", stale) == (412, "a")
     assert change("c", client.get(PATHS[0]).headers["etag"]) == (200, "c")
     assert change("d", "*") == (200, "d")
+    changed = client.request("PATCH", PATHS[0], json={"description": "e"})
+    assert changed.headers["etag"] == client.get(PATHS[0]).headers["etag"]
+    assert change("f", changed.headers["etag"]) == (200, "f")
 
 
 @pytest.mark.usefixtures("store")

@@ -71,7 +71,7 @@ def test_further_facts_are_members_of_the_problem(error: DomainError, members: d
             "a JSON object",
         ),
         ({"type": "missing", "loc": ("query", "fn")}, "fn", "missing", "a value"),
-        ({"type": "missing", "loc": ("body",)}, "body", "missing", "a value"),
+        ({"type": "missing", "loc": ("body",)}, "body", "missing", "a JSON object"),
         (
             {
                 "type": "less_than",
@@ -110,6 +110,10 @@ def test_what_the_framework_finds_wrong_is_told_as_any_wrong_value(
         ("extra_forbidden", 1, {}, "Extra inputs are not permitted", "no field of this name"),
         ("model_attributes_type", [], {}, "Input should be a valid dictionary or object to …", "a JSON object"),
         ("string_too_short", "", {"min_length": 1}, "String should have …", "text of at least 1 character(s)"),
+        ("string_type", 5, {}, "Input should be a valid string", "text"),
+        ("list_type", 5, {}, "Input should be a valid list", "a list"),
+        ("too_short", [], {"min_length": 1}, "List should have at least 1 item …", "1 or more of them"),
+        ("too_long", [], {"max_length": 64}, "List should have at most 64 items …", "at most 64 of them"),
         ("string_pattern_mismatch", "a/b", {"pattern": NAME_PATTERN}, "String …", NAME_RULE.removesuffix(".")),
         ("string_pattern_mismatch", "x", {"pattern": "^a$"}, "String should match …", "text that matches ^a$"),
         ("less_than_equal", "nan", {}, "Input should be less than or equal to 1", "a number less than or equal to 1"),
@@ -138,7 +142,9 @@ def test_what_is_allowed_is_said_in_words_of_ours(
         ("string_type", "body", None, "null"),
         ("float_parsing", "query", "fast", "fast"),
         ("greater_than", "body", -1, "-1"),
-        ("string_too_short", "body", "", ""),
+        ("string_too_short", "body", "", '""'),
+        ("value_error", "body", {"thickness": 0.004}, '{"thickness": 0.004}'),
+        ("too_short", "body", [], "[]"),
     ],
 )
 def test_a_value_of_the_wrong_kind_is_shown_as_json_has_it(kind: str, place: str, value: object, shown: str) -> None:

@@ -59,6 +59,13 @@ def test_a_material_that_cannot_be_is_refused_by_name(client: httpx.Client, body
     assert problem["detail"] == f"{name} is {problem['value']}; allowed: {problem['allowed']}"
 
 
+def test_a_method_that_is_not_taken_is_answered_with_those_that_are(client: httpx.Client) -> None:
+    answer = client.delete("/v1/materials")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD, POST")
+    assert answer.json()["detail"] == "method is DELETE; allowed: GET, HEAD, POST"
+    assert answer.json()["allowed"] == "GET, HEAD, POST"
+
+
 def test_every_wrong_value_is_listed(client: httpx.Client) -> None:
     problem = client.post("/v1/materials", json={"name": "", "description": 1}).json()
     assert [entry["name"] for entry in problem["errors"]] == ["name", "description"]
