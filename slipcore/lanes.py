@@ -1,7 +1,7 @@
-"""Eight numbers at a time, in compiled code, of double or single precision.
+"""64 bytes of numbers at a time, in compiled code: ``count(array)`` is eight of double or sixteen of single precision.
 
-``load(array, index)`` takes eight numbers of a flat array, ``store`` puts them back; sums, differences and products are
-of each of the eight with each of eight others, or with one number. The compiler always turns them into the machine's
+``load(array, index)`` takes as many numbers of a flat array, ``store`` puts them back; sums, differences and products
+are of each of them with each of as many others, or with one number. The compiler always turns them into the machine's
 vector instructions; loops over arrays that might overlap it leaves as they are.
 """
 
@@ -18,10 +18,11 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-COUNT = 8
+BYTES = 64
+"""Of the numbers taken at a time: the widest vectors that machines have; others split them."""
 _VECTORS = {
-    types.float64: ir.VectorType(ir.DoubleType(), COUNT),
-    types.float32: ir.VectorType(ir.FloatType(), COUNT),
+    types.float64: ir.VectorType(ir.DoubleType(), BYTES // 8),
+    types.float32: ir.VectorType(ir.FloatType(), BYTES // 4),
 }
 _OPERATIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
 
@@ -42,8 +43,8 @@ _LANES = {number: _LanesType(number) for number in _VECTORS}
 
 
 def _permuted(builder: Any, first: Any, second: Any, order: list[int]) -> Any:
-    """Those of the sixteen numbers of two vectors that ``order`` [8] names."""
-    return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), COUNT), order))
+    """Those of the numbers of two vectors that ``order``, as long as one of them, names."""
+    return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), len(order)), order))
 
 
 def _operation(function: Callable[..., Any], name: str) -> None:
@@ -59,7 +60,7 @@ def _operation(function: Callable[..., Any], name: str) -> None:
         number = context.cast(builder, arguments[1], types.float64, kinds.args[0].number)
         anything = ir.Constant(vector, ir.Undefined)
         lane = builder.insert_element(anything, number, ir.Constant(ir.IntType(32), 0))
-        return of_two(context, builder, kinds, (arguments[0], _permuted(builder, lane, anything, [0] * COUNT)))
+        return of_two(context, builder, kinds, (arguments[0], _permuted(builder, lane, anything, [0] * vector.count)))
 
     for lanes in _LANES.values():
         lower_builtin(function, lanes, lanes)(of_two)
@@ -81,8 +82,20 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def count(_typing: Any, array: Any) -> Any:
+    """``count(array)``: how many numbers of an array [n] are taken at a time."""
+
+    _check(array)
+
+    def number(context: Any, _builder: Any, _kinds: Any, _arguments: Any) -> Any:
+        return context.get_constant(types.intp, _VECTORS[array.dtype].count)
+
+    return types.intp(array), number
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def load(_typing: Any, array: Any, _index: Any) -> Any:
-    """``load(array, index)``: eight numbers of a contiguous array [n], from an index on; bounds are not checked."""
+    """``load(array, index)``: numbers of a contiguous array [n], from an index on; bounds are not checked."""
 
     _check(array)
 
@@ -94,7 +107,7 @@ def load(_typing: Any, array: Any, _index: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def store(_typing: Any, array: Any, _index: Any, _lanes: Any) -> Any:
-    """``store(array, index, lanes)``: put eight numbers into a contiguous array [n]; bounds are not checked."""
+    """``store(array, index, lanes)``: put numbers into a contiguous array [n]; bounds are not checked."""
 
     _check(array)
 
@@ -107,21 +120,22 @@ def store(_typing: Any, array: Any, _index: Any, _lanes: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def transpose(_typing: Any, array: Any, _index: Any) -> Any:
-    """``transpose(array, index)``: let the rows and columns of the 8 × 8 numbers from an index on change places.
+    """``transpose(array, index)``: let the rows and columns of a square of numbers from an index on change places.
 
-    In blocks of 1, 2 and 4 numbers in turn.
+    In blocks of 1, 2, 4 and so on numbers in turn.
     """
 
     _check(array)
+    number = _VECTORS[array.dtype].count
 
     def exchange(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
         first = _place(context, builder, kinds.args[0], *arguments)
-        places = [builder.gep(first, [ir.Constant(ir.IntType(64), row)]) for row in range(COUNT)]
+        places = [builder.gep(first, [ir.Constant(ir.IntType(64), row)]) for row in range(number)]
         rows = [builder.load(place, align=4) for place in places]
-        for size in (1, 2, 4):
-            kept = [lane if not lane & size else lane + COUNT - size for lane in range(COUNT)]
-            moved = [lane + size if not lane & size else lane + COUNT for lane in range(COUNT)]
-            for row in (row for row in range(COUNT) if not row & size):
+        for size in (1 << bit for bit in range(number.bit_length() - 1)):
+            kept = [lane if not lane & size else lane + number - size for lane in range(number)]
+            moved = [lane + size if not lane & size else lane + number for lane in range(number)]
+            for row in (row for row in range(number) if not row & size):
                 pair = rows[row], rows[row + size]
                 rows[row], rows[row + size] = (_permuted(builder, *pair, order) for order in (kept, moved))
         for row, place in zip(rows, places, strict=True):

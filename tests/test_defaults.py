@@ -42,7 +42,7 @@ NOT_TUNED = {
 """Files whose numbers are mathematics."""
 
 LAYOUT = {
-    "slipcore/lanes.py": {"COUNT"},
+    "slipcore/lanes.py": {"BYTES"},
     "slipcore/notebook.py": {"WIDTH", "HEIGHT"},
     "slipcore/detection/filter/state.py": {"ROWS", "POSE"},
     "slipcore/detection/strain_rate/step.py": {"ROWS"},

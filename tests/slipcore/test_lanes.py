@@ -1,4 +1,4 @@
-"""Eight numbers at a time."""
+"""64 bytes of numbers at a time."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,13 @@ from numba.core.errors import TypingError
 
 from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
-from slipcore.lanes import load, store, transpose
+from slipcore.lanes import count, load, store, transpose
 
 
 @compiled
 def _combined(a: FloatArray, at: int, factor: float, result: FloatArray) -> None:
-    store(result, 1, (load(a, at) + load(a, at + 8)) * factor - load(a, at) * load(a, at + 8))
+    other = at + count(a)
+    store(result, 1, (load(a, at) + load(a, other)) * factor - load(a, at) * load(a, other))
 
 
 @compiled
@@ -19,31 +20,25 @@ def _exchanged(a: FloatArray, at: int) -> None:
     transpose(a, at)
 
 
-def test_sums_and_products_are_of_each_of_the_eight() -> None:
-    a, result = np.random.default_rng(0).normal(size=20), np.zeros(10)
+@pytest.mark.parametrize(("precision", "rounding"), [(np.float64, 1e-14), (np.float32, 1e-5)])
+def test_sums_and_products_are_of_each_of_the_numbers(precision: type, rounding: float) -> None:
+    number = 64 // np.dtype(precision).itemsize
+    a, result = np.random.default_rng(0).normal(size=40).astype(precision), np.zeros(20, dtype=precision)
     _combined(a, 3, 2.5, result)
-    np.testing.assert_allclose(result[1:9], (a[3:11] + a[11:19]) * 2.5 - a[3:11] * a[11:19], rtol=1e-14)
-    assert result[0] == result[9] == 0.0
+    one, other = a[3 : 3 + number], a[3 + number : 3 + 2 * number]
+    np.testing.assert_allclose(result[1 : number + 1], (one + other) * 2.5 - one * other, rtol=rounding, atol=rounding)
+    assert result[0] == 0.0
+    assert not result[number + 1 :].any()
 
 
-def test_rows_and_columns_of_a_square_change_places() -> None:
-    a = np.arange(70.0)
+@pytest.mark.parametrize("precision", [np.float64, np.float32])
+def test_rows_and_columns_of_a_square_change_places(precision: type) -> None:
+    number = 64 // np.dtype(precision).itemsize
+    a = np.arange(number**2 + 6.0).astype(precision)
     expected = a.copy()
-    expected[2:66] = a[2:66].reshape(8, 8).T.ravel()
+    expected[2:-4] = a[2:-4].reshape(number, number).T.ravel()
     _exchanged(a, 2)
     np.testing.assert_array_equal(a, expected)
-
-
-def test_single_precision_has_its_own_lanes() -> None:
-    a, result = np.random.default_rng(0).normal(size=20).astype(np.float32), np.zeros(10, dtype=np.float32)
-    _combined(a, 3, 2.5, result)
-    np.testing.assert_allclose(result[1:9], (a[3:11] + a[11:19]) * 2.5 - a[3:11] * a[11:19], rtol=1e-5, atol=1e-6)
-    assert result[0] == result[9] == 0.0
-    square = np.arange(70.0, dtype=np.float32)
-    expected = square.copy()
-    expected[2:66] = square[2:66].reshape(8, 8).T.ravel()
-    _exchanged(square, 2)
-    np.testing.assert_array_equal(square, expected)
 
 
 @pytest.mark.parametrize("a", [np.zeros(64, dtype=np.int64), np.zeros(128)[::2], np.zeros((8, 8))])

@@ -1,8 +1,8 @@
-"""Fourier transforms of eight complex sequences at a time, in place, in compiled code.
+"""Fourier transforms of as many complex sequences at a time as ``lanes`` takes, in place, in compiled code.
 
-``data`` [n · 16]: for each place of the sequences eight real parts, then eight imaginary ones. Stages split lengths by
-4, 2, 3 and 5 (Gentleman and Sande 1966). The order in which frequencies come out is that of ``places``: a convolution
-need not sort them, because ``inverse`` takes them as ``forward`` leaves them.
+``data`` [n · 2 · count]: for each place of the sequences ``count(data)`` real parts, then as many imaginary ones.
+Stages split lengths by 4, 2, 3 and 5 (Gentleman and Sande 1966). The order in which frequencies come out is that of
+``places``: a convolution need not sort them, because ``inverse`` takes them as ``forward`` leaves them.
 
 The inverse is the forward stages backward, on sequences with real and imaginary parts exchanged: i times the conjugate.
 """
@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
-from slipcore.lanes import COUNT, load, store
+from slipcore.lanes import count, load, store
 
 IntArray = NDArray[np.int64]
 
-STEP = 2 * COUNT
-"""Numbers of one place."""
 _COS_3, _SIN_3 = -0.5, float(np.sqrt(0.75))
 _COS_5, _SIN_5 = float(np.cos(0.4 * np.pi)), float(np.sin(0.4 * np.pi))
 _COS_5_2, _SIN_5_2 = float(np.cos(0.8 * np.pi)), float(np.sin(0.8 * np.pi))
@@ -55,7 +53,7 @@ def places(length: int) -> IntArray:
 @compiled
 def forward(data: FloatArray, splits: IntArray, waves: FloatArray) -> None:
     """Transform in place; ``splits`` and ``waves``: ``radices`` and ``twiddles`` of the length."""
-    size = data.size // STEP
+    size = data.size // (2 * count(data))
     for radix in splits:
         _stage(data, size, radix, waves, False)
         size //= radix
@@ -73,10 +71,11 @@ def inverse(data: FloatArray, splits: IntArray, waves: FloatArray) -> None:
 @compiled
 def _stage(data: FloatArray, size: int, radix: int, waves: FloatArray, back: bool) -> None:
     """One stage for all parts of ``size`` places."""
-    jump = 2 * (data.size // (STEP * size))
-    for first in range(0, data.size, size * STEP):
+    step = 2 * count(data)
+    jump = 2 * (data.size // (step * size))
+    for first in range(0, data.size, size * step):
         for k in range(size // radix):
-            at, between = first + k * STEP, size // radix * STEP
+            at, between = first + k * step, size // radix * step
             if radix == 4:
                 _four(data, at, between, waves, k * jump, back)
             elif radix == 2:
@@ -91,20 +90,20 @@ def _stage(data: FloatArray, size: int, radix: int, waves: FloatArray, back: boo
 def _get(data: FloatArray, at: int, waves: FloatArray, wave: int, back: bool) -> tuple[Any, Any]:
     """The values of one place; on the way back exchanged, and turned by a wave."""
     if not back:
-        return load(data, at), load(data, at + COUNT)
-    return _turned(load(data, at + COUNT), load(data, at), waves, wave)
+        return load(data, at), load(data, at + count(data))
+    return _turned(load(data, at + count(data)), load(data, at), waves, wave)
 
 
 @compiled(inline=True)
 def _put(data: FloatArray, at: int, value: tuple[Any, Any], waves: FloatArray, wave: int, back: bool) -> None:
     """The reverse: turned by a wave on the way there."""
     if back:
-        store(data, at + COUNT, value[0])
+        store(data, at + count(data), value[0])
         store(data, at, value[1])
     else:
         real, imaginary = _turned(value[0], value[1], waves, wave)
         store(data, at, real)
-        store(data, at + COUNT, imaginary)
+        store(data, at + count(data), imaginary)
 
 
 @compiled(inline=True)

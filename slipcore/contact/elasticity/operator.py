@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, ElasticBody
 from slipcore.contact.elasticity.preconditioner import NormalInverse, TangentialInverse
-from slipcore.contact.elasticity.transform import Compiled, Convolution, fast_lengths, padded_lengths, symbols
+from slipcore.contact.elasticity.transform import Compiled, Convolution, fast_lengths, padded_lengths, single, symbols
 from slipcore.frames import FloatArray
 
 
@@ -101,7 +101,7 @@ class ElasticOperator:
         """``tangential`` for compiled code in single precision, in units of ``xx`` of a cell on itself."""
         if self._tangential_single is None:
             own = self._nonzero("xx", self.grid)[0, 0]
-            self._tangential_single = self.convolution.by((self._along() / own).astype(np.float32))
+            self._tangential_single = self.convolution.by(single(self._along() / own))
         return self._tangential_single
 
     def _along(self) -> FloatArray:

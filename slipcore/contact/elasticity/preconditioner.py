@@ -7,7 +7,7 @@ gradients independent of the grid. The box is padded to ``fast_lengths``: a prim
 
 import numpy as np
 
-from slipcore.contact.elasticity.transform import Compiled, Convolution, symbols
+from slipcore.contact.elasticity.transform import Compiled, Convolution, single, symbols
 from slipcore.frames import FloatArray
 
 
@@ -62,7 +62,7 @@ class TangentialInverse:
         b = np.zeros_like(a) if xy is None else circulant_spectrum(xy, odd=True)
         determinant = a * d - b * b
         self._inverse = symbols([[d / determinant, -b / determinant], [-b / determinant, a / determinant]])
-        self.single: Compiled = self._convolution.by((self._inverse * xx[0, 0]).astype(np.float32))
+        self.single: Compiled = self._convolution.by(single(self._inverse * xx[0, 0]))
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""

@@ -1,7 +1,8 @@
 """Circular convolutions of fields of cells with an influence, by Fourier transforms.
 
-Along y first, of two real columns at once as one complex one; then along x, for eight waves along y at a time, with
-multiplication and the way back while the data are near at hand. Padding is never stored for a whole field.
+Along y first, of two real columns at once as one complex one; then along x, for as many waves along y at a time as
+``lanes`` takes (eight, sixteen in single precision), with multiplication and the way back while the data are near at
+hand. Padding is never stored for a whole field.
 """
 
 from typing import Any
@@ -11,11 +12,9 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
-from slipcore.contact.elasticity.fourier import STEP, IntArray, forward, inverse, places, radices, twiddles
+from slipcore.contact.elasticity.fourier import IntArray, forward, inverse, places, radices, twiddles
 from slipcore.frames import FloatArray
-from slipcore.lanes import COUNT, load, store, transpose
-
-_TILE = COUNT * COUNT
+from slipcore.lanes import BYTES, count, load, store, transpose
 
 
 def fast_lengths(shape: tuple[int, int]) -> tuple[int, int]:
@@ -35,8 +34,8 @@ Numbers = NDArray[Any]
 Plan = tuple[IntArray, FloatArray, IntArray, IntArray, FloatArray]
 """``radices``, ``twiddles`` and ``places`` of the length along y; ``radices`` and ``twiddles`` of that along x."""
 Work = tuple[Numbers, Numbers, Numbers, Numbers]
-"""Eight columns along y; all rows along x between the transforms; eight rows of up to two fields before and after they
-are multiplied; four tiles of 8 × 8 numbers.
+"""Columns along y, as many as lanes; all rows along x between the transforms; rows, as many as lanes, of up to two
+fields before and after they are multiplied; four square tiles.
 """
 Compiled = tuple[Numbers, tuple[float, bool], Plan, Work]
 """Symbols, their factor (a scale, and whether they are imaginary), plan and work space of a convolution."""
@@ -45,7 +44,7 @@ Compiled = tuple[Numbers, tuple[float, bool], Plan, Work]
 class Convolution:
     """Convolutions of one or two fields [k, ny, nx], padded with zeros to ``lengths``, that give one or two fields.
 
-    Symbols are influences as their transforms are used: [blocks of eight waves along y, waves along x, 8]. Not for
+    Symbols are influences as their transforms are used: [blocks of waves along y, waves along x, lanes]. Not for
     several threads at once: work space is kept, as fresh memory would cost as much as the transforms.
     """
 
@@ -78,13 +77,13 @@ class Convolution:
         """
         key = max(symbols.shape[:2]), symbols.dtype.char
         if key not in self._work:
-            self._work[key] = self._space(*key)
+            self._work[key] = self._space(*key, symbols.shape[2], symbols.shape[4])
         scale = sign / (self.lengths[0] * self.lengths[1])
         return symbols, (scale, turned), self._plan, self._work[key]
 
-    def _space(self, count: int, precision: str) -> Work:
-        (_, nx), (along_y, along_x) = self.shape, self.lengths
-        sizes = along_y * STEP, count * _blocks(along_y) * nx * STEP, 4 * along_x * STEP, 4 * _TILE
+    def _space(self, fields: int, precision: str, blocks: int, lanes: int) -> Work:
+        (_, nx), (along_y, along_x), step = self.shape, self.lengths, 2 * lanes
+        sizes = along_y * step, fields * blocks * nx * step, 4 * along_x * step, 4 * lanes**2
         column, between, rows, tiles = (np.zeros(size, dtype=precision) for size in sizes)
         return column, between, rows, tiles
 
@@ -104,21 +103,29 @@ class Convolution:
 
 def symbols(spectra: list[list[FloatArray]]) -> FloatArray:
     """A matrix [m, k] of real spectra [waves along y ≥ 0, waves along x] as a convolution takes it."""
-    return np.array([[_arranged(spectrum) for spectrum in row] for row in spectra], order="C")
+    turned = np.array([[spectrum[:, _order(spectrum.shape[1])] for spectrum in row] for row in spectra])
+    return _in_blocks(turned, np.dtype(np.float64))
 
 
-def _arranged(spectrum: FloatArray) -> FloatArray:
-    """Eight waves along y side by side, those along x in the order in which transforms leave them."""
-    along_y, along_x = spectrum.shape
-    blocks = -(-along_y // COUNT)
-    symbol = np.zeros((blocks * COUNT, along_x))
-    symbol[:along_y, places(along_x)] = spectrum
-    return symbol.reshape(blocks, COUNT, along_x).swapaxes(1, 2)
+def single(symbols: FloatArray) -> Numbers:
+    """The same symbols in single precision."""
+    matrix, (blocks, along_x, lanes) = symbols.shape[:2], symbols.shape[2:]
+    return _in_blocks(symbols.swapaxes(3, 4).reshape(*matrix, blocks * lanes, along_x), np.dtype(np.float32))
 
 
-def _blocks(length: int) -> int:
-    """Blocks of eight waves ≥ 0."""
-    return -(-(length // 2 + 1) // COUNT)
+def _order(length: int) -> IntArray:
+    """Frequencies in the order in which transforms leave them."""
+    return np.argsort(places(length))
+
+
+def _in_blocks(waves: FloatArray, precision: np.dtype[Any]) -> Numbers:
+    """Waves along y [m, k, waves along y, waves along x] side by side, as many as lanes of a precision."""
+    lanes = BYTES // precision.itemsize
+    *matrix, along_y, along_x = waves.shape
+    blocks = -(-along_y // lanes)
+    filled = np.zeros((*matrix, blocks * lanes, along_x), dtype=precision)
+    filled[:, :, :along_y] = waves
+    return np.ascontiguousarray(filled.reshape(*matrix, blocks, lanes, along_x).swapaxes(3, 4))
 
 
 @compiled
@@ -126,26 +133,26 @@ def convolve(fields: Numbers, result: Numbers, by: Compiled) -> None:
     """Fill ``result`` [m, ny, nx] from fields [k, ny, nx], both contiguous."""
     symbols, (scale, turned), (splits_y, waves_y, places_y, splits_x, waves_x), work = by
     column, between, rows, tiles = work
-    pair = _halves(fields)
-    for first in range(0, pair[0], COUNT):
+    pair, lanes = _halves(fields), count(column)
+    for first in range(0, pair[0], lanes):
         _read(fields.reshape(-1), fields.shape, pair, first, column)
         forward(column, splits_y, waves_y)
         _separate(column, places_y, (fields.shape[2], first, *pair), between, tiles)
-    nx, given, found, blocks = fields.shape[2], len(fields), len(symbols), symbols.shape[2]
+    nx, given, found, blocks, step = fields.shape[2], len(fields), len(symbols), symbols.shape[2], 2 * lanes
     size = rows.size // 4
     for block in range(blocks):
         for k in range(given):
-            row, at = rows[k * size : (k + 1) * size], (k * blocks + block) * nx * STEP
-            _copy((between, at, COUNT), (row, 0, COUNT), (2 * nx, COUNT), 1.0)
-            row[nx * STEP :] = 0.0
+            row, at = rows[k * size : (k + 1) * size], (k * blocks + block) * nx * step
+            _copy((between, at, lanes), (row, 0, lanes), (2 * nx, lanes), 1.0)
+            row[nx * step :] = 0.0
             forward(row, splits_x, waves_x)
         _multiply(rows, symbols.reshape(-1), (found, given, blocks, block), turned)
         for m in range(found):
-            row, at = rows[(2 + m) * size : (3 + m) * size], (m * blocks + block) * nx * STEP
+            row, at = rows[(2 + m) * size : (3 + m) * size], (m * blocks + block) * nx * step
             inverse(row, splits_x, waves_x)
-            _copy((row, 0, COUNT), (between, at, COUNT), (2 * nx, COUNT), 1.0)
+            _copy((row, 0, lanes), (between, at, lanes), (2 * nx, lanes), 1.0)
     pair = _halves(result)
-    for first in range(0, pair[0], COUNT):
+    for first in range(0, pair[0], lanes):
         _join(between, places_y, (nx, first, *pair), column, tiles)
         inverse(column, splits_y, waves_y)
         _write(result.reshape(-1), result.shape, pair, first, column, scale)
@@ -163,11 +170,11 @@ def _halves(fields: Numbers) -> tuple[int, int, int, int]:
 def _read(
     flat: Numbers, shape: tuple[int, int, int], pair: tuple[int, int, int, int], first: int, column: Numbers
 ) -> None:
-    """Eight pairs of columns from the ``first`` on, padded with zeros."""
-    ny, nx, (reals, others, field, start) = shape[1], shape[2], pair
+    """As many pairs of columns as lanes from the ``first`` on, padded with zeros."""
+    ny, nx, (reals, others, field, start), lanes = shape[1], shape[2], pair, count(column)
     column[:] = 0.0
-    _copy((flat, first, nx), (column, 0, STEP), (ny, reals - first), 1.0)
-    _copy((flat, field * ny * nx + start + first, nx), (column, COUNT, STEP), (ny, others - first), 1.0)
+    _copy((flat, first, nx), (column, 0, 2 * lanes), (ny, reals - first), 1.0)
+    _copy((flat, field * ny * nx + start + first, nx), (column, lanes, 2 * lanes), (ny, others - first), 1.0)
 
 
 @compiled
@@ -180,20 +187,20 @@ def _write(
     scale: float,
 ) -> None:
     """The reverse of ``_read``, scaled."""
-    ny, nx, (reals, others, field, start) = shape[1], shape[2], pair
-    _copy((column, 0, STEP), (flat, first, nx), (ny, reals - first), scale)
-    _copy((column, COUNT, STEP), (flat, field * ny * nx + start + first, nx), (ny, others - first), scale)
+    ny, nx, (reals, others, field, start), lanes = shape[1], shape[2], pair, count(column)
+    _copy((column, 0, 2 * lanes), (flat, first, nx), (ny, reals - first), scale)
+    _copy((column, lanes, 2 * lanes), (flat, field * ny * nx + start + first, nx), (ny, others - first), scale)
 
 
 @compiled
 def _copy(
     source: tuple[Numbers, int, int], target: tuple[Numbers, int, int], size: tuple[int, int], scale: float
 ) -> None:
-    """Rows of at most eight numbers, scaled; ``source`` and ``target``: a flat array, the first place and the step from
-    row to row; ``size``: rows, and numbers that are left in them.
+    """Rows of at most as many numbers as lanes, scaled; ``source`` and ``target``: a flat array, the first place and
+    the step from row to row; ``size``: rows, and numbers that are left in them.
     """
     (given, at, step), (found, to, stride), (rows, left) = source, target, size
-    if left >= COUNT:
+    if left >= count(given):
         for row in range(rows):
             store(found, to + row * stride, load(given, at + row * step) * scale)
     else:
@@ -210,32 +217,32 @@ def _separate(
     between: Numbers,
     tiles: Numbers,
 ) -> None:
-    """From spectra of eight pairs of columns those of each, for waves ≥ 0, as rows ``between``; ``where``: nx, the
-    first column, and what ``_halves`` gives.
+    """From spectra of pairs of columns, as many as lanes, those of each, for waves ≥ 0, as rows ``between``; ``where``:
+    nx, the first column, and what ``_halves`` gives.
     """
     nx, first, reals, others, field, start = where
-    length = places_y.size
-    last, blocks = length // 2, (length // 2 + COUNT) // COUNT
+    length, lanes = places_y.size, count(column)
+    last, blocks, step, square = length // 2, length // 2 // lanes + 1, 2 * lanes, lanes * lanes
     for block in range(blocks):
-        for j in range(COUNT):
-            wave = min(block * COUNT + j, last)
-            at, opposite = places_y[wave] * STEP, places_y[(length - wave) % length] * STEP
-            zr, zi = load(column, at) * 0.5, load(column, at + COUNT) * 0.5
-            cr, ci = load(column, opposite) * 0.5, load(column, opposite + COUNT) * 0.5
-            store(tiles, j * COUNT, zr + cr)
-            store(tiles, _TILE + j * COUNT, zi - ci)
-            store(tiles, 2 * _TILE + j * COUNT, zi + ci)
-            store(tiles, 3 * _TILE + j * COUNT, cr - zr)
+        for j in range(lanes):
+            wave = min(block * lanes + j, last)
+            at, opposite = places_y[wave] * step, places_y[(length - wave) % length] * step
+            zr, zi = load(column, at) * 0.5, load(column, at + lanes) * 0.5
+            cr, ci = load(column, opposite) * 0.5, load(column, opposite + lanes) * 0.5
+            store(tiles, j * lanes, zr + cr)
+            store(tiles, square + j * lanes, zi - ci)
+            store(tiles, 2 * square + j * lanes, zi + ci)
+            store(tiles, 3 * square + j * lanes, cr - zr)
         for tile in range(4):
-            transpose(tiles, tile * _TILE)
+            transpose(tiles, tile * square)
         row, other = block * nx + first, (field * blocks + block) * nx + start + first
-        for i in range(COUNT):
+        for i in range(lanes):
             if i < reals - first:
-                store(between, (row + i) * STEP, load(tiles, i * COUNT))
-                store(between, (row + i) * STEP + COUNT, load(tiles, _TILE + i * COUNT))
+                store(between, (row + i) * step, load(tiles, i * lanes))
+                store(between, (row + i) * step + lanes, load(tiles, square + i * lanes))
             if i < others - first:
-                store(between, (other + i) * STEP, load(tiles, 2 * _TILE + i * COUNT))
-                store(between, (other + i) * STEP + COUNT, load(tiles, 3 * _TILE + i * COUNT))
+                store(between, (other + i) * step, load(tiles, 2 * square + i * lanes))
+                store(between, (other + i) * step + lanes, load(tiles, 3 * square + i * lanes))
 
 
 @compiled
@@ -246,29 +253,29 @@ def _join(
     column: Numbers,
     tiles: Numbers,
 ) -> None:
-    """The reverse: spectra of eight pairs of columns."""
+    """The reverse: spectra of pairs of columns."""
     nx, first, _, _, field, start = where
-    length = places_y.size
-    last, blocks = length // 2, (length // 2 + COUNT) // COUNT
+    length, lanes = places_y.size, count(column)
+    last, blocks, step, square = length // 2, length // 2 // lanes + 1, 2 * lanes, lanes * lanes
     for block in range(blocks):
-        for i in range(COUNT):
-            row = (block * nx + min(first + i, nx - 1)) * STEP
-            other = ((field * blocks + block) * nx + min(start + first + i, nx - 1)) * STEP
-            store(tiles, i * COUNT, load(between, row))
-            store(tiles, _TILE + i * COUNT, load(between, row + COUNT))
-            store(tiles, 2 * _TILE + i * COUNT, load(between, other))
-            store(tiles, 3 * _TILE + i * COUNT, load(between, other + COUNT))
+        for i in range(lanes):
+            row = (block * nx + min(first + i, nx - 1)) * step
+            other = ((field * blocks + block) * nx + min(start + first + i, nx - 1)) * step
+            store(tiles, i * lanes, load(between, row))
+            store(tiles, square + i * lanes, load(between, row + lanes))
+            store(tiles, 2 * square + i * lanes, load(between, other))
+            store(tiles, 3 * square + i * lanes, load(between, other + lanes))
         for tile in range(4):
-            transpose(tiles, tile * _TILE)
-        for j in range(min(COUNT, last + 1 - block * COUNT)):
-            wave = block * COUNT + j
-            at, opposite = places_y[wave] * STEP, places_y[(length - wave) % length] * STEP
-            ar, ai = load(tiles, j * COUNT), load(tiles, _TILE + j * COUNT)
-            br, bi = load(tiles, 2 * _TILE + j * COUNT), load(tiles, 3 * _TILE + j * COUNT)
+            transpose(tiles, tile * square)
+        for j in range(min(lanes, last + 1 - block * lanes)):
+            wave = block * lanes + j
+            at, opposite = places_y[wave] * step, places_y[(length - wave) % length] * step
+            ar, ai = load(tiles, j * lanes), load(tiles, square + j * lanes)
+            br, bi = load(tiles, 2 * square + j * lanes), load(tiles, 3 * square + j * lanes)
             store(column, opposite, ar + bi)
-            store(column, opposite + COUNT, br - ai)
+            store(column, opposite + lanes, br - ai)
             store(column, at, ar - bi)
-            store(column, at + COUNT, br + ai)
+            store(column, at + lanes, br + ai)
 
 
 @compiled
@@ -277,17 +284,17 @@ def _multiply(rows: Numbers, symbols: Numbers, sizes: tuple[int, int, int, int],
     block of how many.
     """
     found, given, blocks, block = sizes
-    size = rows.size // 4
+    size, lanes = rows.size // 4, count(rows)
     for m in range(found):
         one = (m * given * blocks + block) * (size // 2)
         two = ((m * given + given - 1) * blocks + block) * (size // 2)
-        for at in range(0, size, STEP):
+        for at in range(0, size, 2 * lanes):
             factor = load(symbols, one + at // 2)
-            real, imaginary = factor * load(rows, at), factor * load(rows, at + COUNT)
+            real, imaginary = factor * load(rows, at), factor * load(rows, at + lanes)
             if given == 2:
                 factor = load(symbols, two + at // 2)
                 real = real + factor * load(rows, size + at)
-                imaginary = imaginary + factor * load(rows, size + at + COUNT)
+                imaginary = imaginary + factor * load(rows, size + at + lanes)
             to = (2 + m) * size + at
             store(rows, to, imaginary * -1.0 if turned else real)
-            store(rows, to + COUNT, real if turned else imaginary)
+            store(rows, to + lanes, real if turned else imaginary)

@@ -5,7 +5,7 @@ import pytest
 
 from slipcore.contact.elasticity import fourier, transform
 from slipcore.contact.elasticity.transform import Convolution, padded_lengths, symbols
-from slipcore.lanes import COUNT
+from slipcore.lanes import BYTES
 from tests.slipcore.contact.elasticity.test_transform import even, summed
 from tests.slipcore.plain_kernels import as_plain_python
 
@@ -17,7 +17,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("length", [2, 3, 4, 5, 8, 15, 36, 40])
 def test_there_and_back(length: int) -> None:
-    values = np.random.default_rng(length).normal(size=(length, 2, COUNT))
+    values = np.random.default_rng(length).normal(size=(length, 2, BYTES // 8))
     data, plan = values.reshape(-1).copy(), (fourier.radices(length), fourier.twiddles(length))
     fourier.forward(data, *plan)
     found = data.reshape(values.shape)[fourier.places(length)]
@@ -30,7 +30,7 @@ def test_there_and_back(length: int) -> None:
 @pytest.mark.parametrize("shape", [(5, 8), (9, 11), (1, 17)])
 @pytest.mark.parametrize(("given", "found"), [(1, 1), (2, 2), (2, 1), (1, 2)])
 def test_a_convolution(shape: tuple[int, int], given: int, found: int) -> None:
-    """Of a scale, and of fields that fill no eight columns."""
+    """Of a scale, and of fields that do not fill the lanes."""
     rng = np.random.default_rng(given + 2 * found)
     convolution, fields = Convolution(shape, padded_lengths(shape)), rng.normal(size=(given, *shape))
     quadrants = rng.normal(size=(found, given, *shape))
