@@ -146,8 +146,14 @@ class TangentialDefaults(Options):
     tolerance: Annotated[float, Option(1e-14, 0.5, "-", "of a solution that others are compared with")] = 1e-8
     """Of the natural map, as a share of the largest limit, where none is asked."""
     newton_steps: Annotated[int, Option(1, 1000, "steps", "bound")] = 60
-    reduction: Annotated[float, Option(1e-6, 0.9, "-", "trials, 0.03 to 0.1")] = 0.05
-    """How far each Newton system is solved, in the preconditioned residual."""
+    reduction: Annotated[float, Option(1e-6, 0.9, "-", "trials, 0.05 to 0.12")] = 0.1
+    """How far each Newton system is solved at least; further as Newton converges."""
+    least_reduction: Annotated[float, Option(1e-6, 0.9, "-", "far above rounding of single precision")] = 1e-3
+    """How far each is solved at most."""
+    enough: Annotated[float, Option(0.01, 1.0, "-", "room for what the system does not show")] = 0.3
+    """Of the tolerance: a system that leaves less is solved far enough."""
+    motion_slack: Annotated[float, Option(0.0, 0.5, "-", "hardly shows in the residual")] = 0.01
+    """Of the tolerance, by which the rigid motion may be off as a gradient step shows it."""
     iterations: Annotated[int, Option(1, 1000, "iterations", "an inexact solve is enough")] = 25
     """Most conjugate gradients a Newton step."""
     slow: Annotated[float, Option(0.0, 1.0, "-", "Newton's steps fall faster where they work")] = 0.9

@@ -79,8 +79,7 @@ def bounding_box(mask: BoolArray, multiple: int = 1) -> Box:
 
 
 def _span(occupied: BoolArray, multiple: int) -> slice:
-    cells = np.flatnonzero(occupied)
-    first, last = int(cells[0]), int(cells[-1]) + 1
+    first, last = int(occupied.argmax()), len(occupied) - int(occupied[::-1].argmax())
     size = min(-(-(last - first) // multiple) * multiple, len(occupied))
     first = min(first, len(occupied) - size)
     return slice(first, first + size)

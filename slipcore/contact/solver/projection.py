@@ -77,7 +77,7 @@ def project(
     traction = np.empty_like(point)
     point = np.ascontiguousarray(point)  # a view of a larger array would be compiled for once more
     motion, imbalance, iterations, feasible = nearest_tractions(
-        (point, radius, arm, target, given), first, traction, max_iterations
+        (point, radius, arm, target, given), first, traction, (0.0, max_iterations)
     )
     return Projection(traction, motion, imbalance, iterations, feasible)
 
@@ -87,12 +87,14 @@ def nearest_tractions(
     given_constraints: tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray],
     motion: FloatArray,
     traction: FloatArray,
-    max_iterations: int,
+    bounds: tuple[float, int],
 ) -> tuple[FloatArray, FloatArray, int, bool]:
     """``project`` for compiled code: Newton's steps on φ from a dual ``motion``; fills the ``traction``.
 
-    The constraints come as a plain tuple, which enters compiled code four times as fast as a named one.
+    ``bounds``: by how much the dual may be off, as Newton's next step shows it, and most steps. The constraints come as
+    a plain tuple, which enters compiled code four times as fast as a named one.
     """
+    slack, max_iterations = bounds
     constraints = Constraints(*given_constraints)
     tight = _TIGHT * _sum(constraints.radius)
     here = Evaluation(traction, np.empty(3), np.empty((3, 3)))
@@ -102,14 +104,18 @@ def nearest_tractions(
         traction[:] = np.nan
         return motion, np.full(3, np.nan), 0, feasible
     _evaluate(constraints, motion, here)
-    iteration = 0
+    iteration, before = 0, np.inf
     for iteration in range(max_iterations):  # noqa: B007
-        if np.abs(here.gradient).max() <= tight:
+        size = np.abs(here.gradient).max()
+        if size <= tight:
             break
-        if np.abs(motion).max() > _FLAT * reach or _is_certificate(constraints, motion):
+        # Of a load that cannot be carried some imbalance stays; where it falls there is nothing to certify.
+        if np.abs(motion).max() > _FLAT * reach or (size > _SLOPE * before and _is_certificate(constraints, motion)):
             feasible = False
             break
-        step = -_solve(here.hessian, here.gradient, constraints.given)
+        step, before = -_solve(here.hessian, here.gradient, constraints.given), size
+        if np.abs(step).max() <= slack:
+            break
         # Where all disks are left on one side φ is straight and Newton's step has no length of its own.
         step *= min(1.0, 2.0 * (reach + np.abs(motion).max()) / max(np.abs(step).max(), _TINY))
         motion = _search(constraints, motion, step, here.gradient, tight, trial)
@@ -196,10 +202,10 @@ def _evaluate_block(
     for i in range(radius.size):
         x, y = arm_x[i], arm_y[i]
         qx, qy = point_x[i] + mx - y * yaw, point_y[i] + my + x * yaw
-        square = qx * qx + qy * qy + _TINY
-        share = min(1.0, radius[i] / np.sqrt(square))
+        over = 1.0 / np.sqrt(qx * qx + qy * qy + _TINY)
+        share = min(1.0, radius[i] * over)
         free = 1.0 if share == 1.0 else 0.0
-        turning = (1.0 - free) * share / square  # at its limit a traction turns, but does not grow
+        turning = (1.0 - free) * share * over * over  # at its limit a traction turns, but does not grow
         jxx, jxy, jyy = free + turning * qy * qy, -turning * qx * qy, free + turning * qx * qx
         qx, qy = share * qx, share * qy
         traction_x[i], traction_y[i] = qx, qy

@@ -145,7 +145,7 @@ class QuasiStatic:
         shear = float(np.hypot(drive[0], drive[1]))
         if drive[2] != 0.0:
             shear += abs(drive[2]) / _lever(state.stress.pressure, self.grid)
-        return float(np.clip(max(abs(now - before) / now, shear / max(capacity, TINY)), STEP.least_share, 1.0))
+        return min(max(abs(now - before) / now, shear / max(capacity, TINY), STEP.least_share), 1.0)
 
     def _advance(
         self,
@@ -241,9 +241,9 @@ class QuasiStatic:
         """Slip m above which a cell moves against the object: a share of the object's motion, and more than solver
         noise.
         """
-        (rows, columns), (dx, dy, turn) = solution.box, motion
-        x, y = self.grid.x[columns], self.grid.y[rows]
-        carried = max(math.hypot(dx - turn * b, dy + turn * a) for a in x[[0, -1]] for b in y[[0, -1]])  # the corners
+        (rows, columns), (dx, dy, turn) = solution.box, motion.tolist()
+        x, y = (places[[0, -1]].tolist() for places in (self.grid.x[columns], self.grid.y[rows]))
+        carried = max(math.hypot(dx - turn * b, dy + turn * a) for a in x for b in y)  # the corners
         kernel = equations.operators.on(self.grid).influence("xx")
         compliance = 0.0 if kernel is None else float(kernel[0, 0])
         return max(STEP.moved * carried, STEP.noise * equations.tolerance * float(solution.limit.max()) * compliance)

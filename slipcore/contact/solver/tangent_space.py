@@ -187,7 +187,7 @@ def newton_move(
         return move, (int(moved), 0, 0)
     change, count = _conjugate_gradients(_scaled(space, stiffness), _shares(left, top), by[1:], bounds[2:])
     _add(m, change.reshape(2, -1), stiffness * top)
-    return move, (count + moved, count, count + 1)
+    return move, (count + moved, count, count)
 
 
 @compiled
@@ -245,7 +245,10 @@ def _excess(target: FloatArray, traction: FloatArray, move: FloatArray, arm: Flo
 def _conjugate_gradients(
     space: ScaledSpace, residual: SingleArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
 ) -> tuple[SingleArray, int]:
-    """The move [2, ny, nx] that takes a ``residual``, which is overwritten, to zero; how often it took the operator."""
+    """The move [2, ny, nx] that takes a ``residual``, which is overwritten, to zero; how often it took the operator.
+
+    How far it came is told by the residual itself: to ask the preconditioned one would take one more preconditioner.
+    """
     (operator, preconditioner), (reduction, most) = by, bounds
     move, direction, image, improved = (
         np.zeros_like(residual),
@@ -260,24 +263,29 @@ def _conjugate_gradients(
         image.reshape(2, -1),
         improved.reshape(2, -1),
     )
-    for k in range(2):
-        for j in range(r.shape[1]):
-            i[k, j] = space[4][j] * r[k, j]
-    convolve(image, improved, preconditioner)
-    size, motion = _improve(space, r, g)
-    first, share, count = size, 0.0, 0
-    while count < most and size > 0.0:
-        _turn(space[0], space[1], motion, d, g, share)
-        convolve(direction, image, operator)
-        _advance(space, m, r, d, i, size)
+    left = first = _scaled_into(space[4], r, i)
+    before, count = np.inf, 0
+    while count < most and left > reduction**2 * first:
         convolve(image, improved, preconditioner)
-        before = size
         size, motion = _improve(space, r, g)
-        share = size / before
-        count += 1
-        if size <= reduction**2 * first:
+        if not size > 0.0:
             break
+        _turn(space[0], space[1], motion, d, g, size / before)
+        convolve(direction, image, operator)
+        left = _advance(space, m, r, d, i, size)
+        before, count = size, count + 1
     return move, count
+
+
+@compiled(fastmath=VECTOR)
+def _scaled_into(scale: SingleArray, residual: SingleArray, image: SingleArray) -> float:
+    """Fill the image with the scaled residual; the sum of the squares of the latter."""
+    square = 0.0
+    for i in range(scale.size):
+        rx, ry = residual[0, i], residual[1, i]
+        image[0, i], image[1, i] = scale[i] * rx, scale[i] * ry
+        square += rx * rx + ry * ry
+    return square
 
 
 @compiled
@@ -288,13 +296,13 @@ def _advance(
     direction: SingleArray,
     image: SingleArray,
     size: float,
-) -> None:
-    """One conjugate-gradient step in place; ``image``: the operator on ``direction``, then the new residual, scaled for
-    the preconditioner.
+) -> float:
+    """One conjugate-gradient step in place; the square of the new residual. ``image``: the operator on ``direction``,
+    then the new residual, scaled for the preconditioner.
     """
     projector, arm, inverse_gram, curvature, scale = space
     product, sums = _stiffen(projector, arm, curvature, direction, image)
-    _go_on(projector, arm, scale, _rigid(inverse_gram, sums), (move, residual, direction, image), size / product)
+    return _go_on(projector, arm, scale, _rigid(inverse_gram, sums), (move, residual, direction, image), size / product)
 
 
 @compiled(fastmath=VECTOR)
@@ -323,12 +331,12 @@ def _go_on(
     motion: FloatArray,
     fields: tuple[SingleArray, SingleArray, SingleArray, SingleArray],
     step: float,
-) -> None:
+) -> float:
     """Add a step along a direction to the move, and its image without a rigid motion to the residual, in place; scale
-    the latter into the image.
+    the latter into the image; its square.
     """
     move, residual, direction, image = fields
-    mx, my, yaw = motion[0], motion[1], motion[2]
+    mx, my, yaw, square = motion[0], motion[1], motion[2], 0.0
     for i in range(move.shape[1]):
         dx, dy = mx - arm[1, i] * yaw, my + arm[0, i] * yaw
         move[0, i] += step * direction[0, i]
@@ -337,6 +345,8 @@ def _go_on(
         ry = residual[1, i] + step * (image[1, i] - projector[1, i] * dx - projector[2, i] * dy)
         residual[0, i], residual[1, i] = rx, ry
         image[0, i], image[1, i] = scale[i] * rx, scale[i] * ry
+        square += rx * rx + ry * ry
+    return square
 
 
 @compiled

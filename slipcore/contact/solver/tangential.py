@@ -35,7 +35,7 @@ _SLOPE_ROUNDING, _MOVE_ROUNDING, _PROJECTION_STEPS = (
     TANGENTIAL.move_rounding,
     PROJECTION.newton_steps,
 )
-_REDUCTION, _ITERATIONS, _SLOW = TANGENTIAL.reduction, TANGENTIAL.iterations, TANGENTIAL.slow
+_ITERATIONS, _SLOW = TANGENTIAL.iterations, TANGENTIAL.slow
 Fields = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 """Traction, displacement, offset, slip and nearest feasible traction, each [2, ny, nx]."""
 Constraints = tuple[FloatArray, FloatArray, FloatArray, BoolArray]
@@ -114,7 +114,7 @@ class _TangentialStep:
         control: SolverControl,
     ) -> None:
         self.operator, self.limit, self.control = operator, np.ascontiguousarray(limit), control
-        self.given, self.arm = control.given, np.stack(points)
+        self.given, self.arm = control.given, np.array(points)
         radius = self.limit.reshape(-1)
         extent, self.largest, self.capacity = _extent(self.arm.reshape(2, -1), radius)
         self.length = extent or max(operator.grid.pitch)
@@ -129,9 +129,10 @@ class _TangentialStep:
         kernel = operator.influence("xx")
         assert kernel is not None  # no body is rigid
         self.stiffness = 1.0 / float(kernel[0, 0])
-        self.dual = np.zeros(3)
+        self.dual, self.slack = np.zeros(3), 0.0
 
     def solve(self, start: FloatArray, tolerance: float, max_iterations: int) -> TangentialContact:
+        self.slack = TANGENTIAL.motion_slack * tolerance * self.largest
         traction, feasible = self.project(start)
         if not feasible:
             return self._at_the_limit()
@@ -173,7 +174,7 @@ class _TangentialStep:
         """How far a gradient step leads before it is projected back, as a share of the largest limit; fills the slip
         and the nearest feasible traction. The projection's dual, which is kept, is the rigid motion.
         """
-        self.dual, change = _natural_map(here, self.constraints, self.stiffness, self.dual)
+        self.dual, change = _natural_map(here, self.constraints, self.stiffness, self.dual, self.slack)
         return change / self.largest
 
     def _go_on(
@@ -184,8 +185,11 @@ class _TangentialStep:
         """
         operator = self.operator
         by = operator.tangential_compiled, operator.tangential_single, operator.tangential_inverse.single
-        how = self.stiffness, self.largest, tolerance
-        self.dual, residual, iterations, taken = _rounds(here, self.constraints, by, how, self.dual, residuals, rounds)
+        how = self.stiffness, self.largest, tolerance, self.slack
+        forcing = TANGENTIAL.reduction, TANGENTIAL.least_reduction, TANGENTIAL.enough
+        self.dual, residual, iterations, taken = _rounds(
+            here, self.constraints, by, how, forcing, self.dual, residuals, rounds
+        )
         count = operator.count
         count.tangential, count.single = count.tangential + taken[0], count.single + taken[1]
         count.inverse += taken[2]
@@ -246,7 +250,8 @@ def _rounds(
     here: Fields,
     constraints: Constraints,
     by: tuple[Compiled, Compiled, Compiled],
-    how: tuple[float, float, float],
+    how: tuple[float, float, float, float],
+    forcing: tuple[float, float, float],
     dual: FloatArray,
     residuals: tuple[float, float],
     rounds: tuple[int, int],
@@ -254,20 +259,36 @@ def _rounds(
     """``_TangentialStep._go_on``: the dual, the last residual, the round, and what was taken.
 
     ``by``: operator, the same in single precision, and preconditioner; ``how``: the stiffness that scales a gradient
-    step, the largest limit, and the tolerance. Where Newton's steps stall, the gradient step is taken every other time.
+    step, the largest limit, the tolerance, and by how much the rigid motion may be off; ``forcing``: as ``_share_left``
+    has it. Where Newton's steps stall, the gradient step is taken every other time.
     """
-    (traction, displacement, _, slip, nearest), (stiffness, top, tolerance) = here, how
+    (traction, displacement, _, slip, nearest), (stiffness, top, tolerance, slack) = here, how
     (before, residual), (iteration, last), (applied, single, inverted) = residuals, rounds, (0, 0, 0)
+    trial = np.empty_like(traction)
     while iteration < last and tolerance < residual < np.inf:
-        trial = nearest.copy()
         if residual <= _SLOW * before or iteration % 2 == 0:
-            taken = _newton(traction, slip, trial, constraints, by, (stiffness, _MOVE_ROUNDING * top))
+            bounds = stiffness, _MOVE_ROUNDING * top, _share_left(before, residual, tolerance, forcing)
+            taken = _newton(traction, slip, trial, constraints, by, bounds)
             applied, single, inverted = applied + taken[0], single + taken[1], inverted + taken[2]
+        else:
+            _balance(nearest.reshape(2, -1), constraints, trial.reshape(2, -1))
         _search((traction, displacement), slip, trial, constraints[0], by[0])
-        dual, change = _natural_map(here, constraints, stiffness, dual)
+        dual, change = _natural_map(here, constraints, stiffness, dual, slack)
         before, residual = residual, change / top
         applied, iteration = applied + 1, iteration + 1
     return dual, residual, iteration, (applied, single, inverted)
+
+
+@compiled
+def _share_left(before: float, residual: float, tolerance: float, forcing: tuple[float, float, float]) -> float:
+    """What the next Newton system may leave (Eisenstat and Walker 1996, second choice): the square of the share to
+    which the residual fell, so that convergence can be quadratic, but no less than what the tolerance asks.
+
+    ``forcing``: the most and the least that may be left, and the share of the tolerance that is little enough.
+    """
+    most, least, enough = forcing
+    fell = residual / before if before < np.inf else 1.0
+    return min(max(fell * fell, enough * tolerance / residual, least), most)
 
 
 @compiled
@@ -277,27 +298,38 @@ def _newton(
     trial: FloatArray,
     constraints: Constraints,
     by: tuple[Compiled, Compiled, Compiled],
-    how: tuple[float, float],
+    how: tuple[float, float, float],
 ) -> Taken:
-    """Fill the ``trial`` with where a Newton step leads, projected back; what it took."""
-    (radius, arm, target, given), (stiffness, negligible) = constraints, how
+    """Fill the ``trial`` with where a Newton step leads, projected back; what it took.
+
+    ``how``: the stiffness that scales a gradient step, a move that is none, and how far to solve the system.
+    """
+    (radius, arm, target, given), (stiffness, negligible, reduction) = constraints, how
     cells, q, p = np.empty((FIELDS, radius.size)), traction.reshape(2, -1), trial.reshape(2, -1)
     inverse_gram = survey((q, slip.reshape(2, -1), radius, stiffness), (arm, given), cells)
     space, onto_circle = (cells[:3], arm, inverse_gram, cells[5], cells[6]), cells[3:5].reshape(traction.shape)
-    bounds = stiffness, negligible, _REDUCTION, int(_ITERATIONS)  # a literal would be a type of its own, compiled anew
+    bounds = stiffness, negligible, reduction, int(_ITERATIONS)  # a literal would be a type of its own, compiled anew
     move, taken = newton_move(space, (traction, slip, onto_circle), target, by, bounds)
     point = np.empty_like(q)
     outward(q, move.reshape(2, -1), cells[6], point)
-    nearest_tractions((point, radius, arm, target, given), np.zeros(3), p, _PROJECTION_STEPS)
+    _balance(point, constraints, p)
     return taken
 
 
 @compiled
+def _balance(point: FloatArray, constraints: Constraints, traction: FloatArray) -> None:
+    """Fill the ``traction`` [2, n] with the feasible one nearest to a ``point``."""
+    radius, arm, target, given = constraints
+    exactly = 0.0, int(_PROJECTION_STEPS)
+    nearest_tractions((point, radius, arm, target, given), np.zeros(3), traction, exactly)
+
+
+@compiled
 def _natural_map(
-    here: Fields, constraints: Constraints, stiffness: float, dual: FloatArray
+    here: Fields, constraints: Constraints, stiffness: float, dual: FloatArray, slack: float
 ) -> tuple[FloatArray, float]:
     """Fill the slip and the feasible traction nearest to a gradient step; the dual of that, from a guess of it, and the
-    largest change of traction.
+    largest change of traction. ``slack``: by how much the dual may be off, and so the traction miss the load.
     """
     (traction, displacement, offset, slip, nearest), (radius, arm, target, given) = here, constraints
     point = np.empty_like(traction)
@@ -307,7 +339,7 @@ def _natural_map(
         slope = u[i] + c[i]
         g[i], w[i] = slope, q[i] - stiffness * slope
     step = point.reshape(2, -1), radius, arm, target, given
-    dual, _, _, _ = nearest_tractions(step, dual, nearest.reshape(2, -1), _PROJECTION_STEPS)
+    dual, _, _, _ = nearest_tractions(step, dual, nearest.reshape(2, -1), (slack, int(_PROJECTION_STEPS)))
     _subtract_rigid(slip.reshape(2, -1), arm, dual / stiffness)
     for i in range(q.size):
         w[i] = p[i] - q[i]
@@ -323,21 +355,22 @@ def _subtract_rigid(field: FloatArray, arm: FloatArray, motion: FloatArray) -> N
         field[1, i] -= my + yaw * arm[0, i]
 
 
-@compiled
+@compiled(fastmath=VECTOR)
 def _slides(traction: FloatArray, slip: FloatArray, limit: FloatArray, stiffness: float, slides: BoolArray) -> bool:
     """Fill in which cells [ny, nx] slide; whether all do that touch."""
-    q, s, radius, found, everywhere = (
+    q, s, radius, found, sticking = (
         traction.reshape(2, -1),
         slip.reshape(2, -1),
         limit.reshape(-1),
         slides.reshape(-1),
-        True,
+        0,
     )
     for i in range(radius.size):
         x, y = q[0, i] - stiffness * s[0, i], q[1, i] - stiffness * s[1, i]
-        found[i] = np.sqrt(x * x + y * y) > radius[i]
-        everywhere &= found[i] or radius[i] <= 0.0
-    return everywhere
+        outside = x * x + y * y > radius[i] * radius[i]
+        found[i] = outside
+        sticking += (not outside) & (radius[i] > 0.0)
+    return sticking == 0
 
 
 @compiled
@@ -353,8 +386,10 @@ def _search(
     traction, displacement = here
     way, response = trial - traction, np.empty_like(trial)
     convolve(way, response, operator)
-    slope, curvature, work = _slopes(slip, way, response, limit)
-    best = -slope / curvature if curvature > 0.0 and abs(slope) > _SLOPE_ROUNDING * work else 1.0
+    slope, curvature = _slopes(slip, way, response)
+    best = -slope / curvature if curvature > 0.0 else 1.0
+    if best < 0.5 and abs(slope) <= _SLOPE_ROUNDING * _work(slip, limit):
+        best = 1.0
     share = 1.0 if best >= 0.5 else max(best, 0.0)
     q, u, t = traction.reshape(-1), displacement.reshape(-1), trial.reshape(-1)
     w, r = way.reshape(-1), response.reshape(-1)
@@ -364,19 +399,23 @@ def _search(
 
 
 @compiled(fastmath=VECTOR)
-def _slopes(slip: FloatArray, way: FloatArray, response: FloatArray, limit: FloatArray) -> tuple[float, float, float]:
-    """Slope and curvature of the objective along a ``way`` [2, ny, nx], and the work of the slip's size at the limits.
+def _slopes(slip: FloatArray, way: FloatArray, response: FloatArray) -> tuple[float, float]:
+    """Slope and curvature of the objective along a ``way`` [2, ny, nx], whose displacement is the ``response``."""
+    slope = curvature = 0.0
+    s, w, c = slip.reshape(-1), way.reshape(-1), response.reshape(-1)
+    for i in range(w.size):
+        slope += s[i] * w[i]
+        curvature += w[i] * c[i]
+    return slope, curvature
 
-    ``response``: the way's displacement.
-    """
-    slope = curvature = work = 0.0
-    s, w, c, radius = slip.reshape(2, -1), way.reshape(2, -1), response.reshape(2, -1), limit.reshape(-1)
-    for i in range(radius.size):
-        sx, sy, wx, wy = s[0, i], s[1, i], w[0, i], w[1, i]
-        slope += sx * wx + sy * wy
-        curvature += wx * c[0, i] + wy * c[1, i]
-        work += np.sqrt(sx * sx + sy * sy) * radius[i]
-    return slope, curvature, work
+
+@compiled(fastmath=VECTOR)
+def _work(slip: FloatArray, limit: FloatArray) -> float:
+    """What friction at its limits would take up of a slip's size [2, ny, nx]: what a slope rounds by."""
+    s, work = slip.reshape(2, -1), 0.0
+    for i in range(limit.size):
+        work += np.sqrt(s[0, i] * s[0, i] + s[1, i] * s[1, i]) * limit[i]
+    return work
 
 
 def _frictionless(offset: FloatArray, control: SolverControl) -> TangentialContact:

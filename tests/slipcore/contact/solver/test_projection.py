@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from slipcore.contact.elasticity.fields import resultants, rigid_displacement
 from slipcore.contact.limit_load import limit_load
-from slipcore.contact.solver.projection import project
+from slipcore.contact.solver.projection import nearest_tractions, project
 from slipcore.contact.solver.sliding import sliding_traction
 
 GIVEN = np.ones(3, dtype=bool)
@@ -49,6 +49,20 @@ def test_projection_minimises_the_dual_that_numpy_minimises() -> None:
     got = project(point, radius, arm, target, GIVEN)
     reference = minimize(dual, np.zeros(3), args=(point, radius, arm, target), method="BFGS", tol=1e-9)
     np.testing.assert_allclose(got.motion, reference.x, rtol=1e-5, atol=1e-6)  # BFGS with numerical gradients
+
+
+@pytest.mark.parametrize("slack", [1e-2, 1e-5])
+def test_a_dual_that_may_be_off_is_so_by_no_more(slack: float) -> None:
+    radius, arm, point = disks()
+    target, traction = np.array([0.5, -0.1, 0.1]) * radius.sum(), np.empty_like(point)
+    exact = project(point, radius, arm, target, GIVEN)
+    motion, _, steps, feasible = nearest_tractions(
+        (point, radius, arm, target, GIVEN), np.zeros(3), traction, (slack, 60)
+    )
+    assert feasible
+    assert steps < exact.iterations
+    assert np.abs(motion - exact.motion).max() <= 1.5 * slack
+    np.testing.assert_allclose(traction, on_disks(point + rigid_displacement(arm, motion), radius), atol=1e-14)
 
 
 def test_compiled_projection_is_the_interpreted_one() -> None:

@@ -139,7 +139,7 @@ def test_fused_loops_of_a_newton_round_are_what_numpy_makes_of_them() -> None:
     limit, slip, nearest = np.abs(arm[0]), np.empty_like(traction), np.empty_like(traction)
     constraints = limit.ravel(), arm.reshape(2, -1), np.array([0.3, -0.2, 0.7]), np.ones(3, dtype=bool)
     here = traction, displacement, offset, slip, nearest
-    dual, change = compiled._natural_map(here, constraints, 0.7, np.zeros(3))
+    dual, change = compiled._natural_map(here, constraints, 0.7, np.zeros(3), 0.0)
     gradient = displacement + offset
     point = traction - 0.7 * gradient
     expected = project(point.reshape(2, -1), *constraints)
@@ -152,8 +152,18 @@ def test_fused_loops_of_a_newton_round_are_what_numpy_makes_of_them() -> None:
     np.testing.assert_array_equal(slides, np.hypot(*(traction - 0.7 * slip)) > limit)
     assert compiled._slides(traction, slip, np.where(slides, limit, 0.0), 0.7, slides)
     way, response = point, offset
-    sums = (slip * way).sum(), (way * response).sum(), (np.hypot(*slip) * limit).sum()
-    np.testing.assert_allclose(compiled._slopes(slip, way, response, limit.ravel()), sums, rtol=1e-12)
+    sums = (slip * way).sum(), (way * response).sum()
+    np.testing.assert_allclose(compiled._slopes(slip, way, response), sums, rtol=1e-12)
+    assert compiled._work(slip, limit.ravel()) == pytest.approx((np.hypot(*slip) * limit).sum(), rel=1e-12)
+
+
+def test_systems_are_solved_the_further_the_faster_newton_converges() -> None:
+    forcing = 0.1, 1e-3, 0.3
+    assert compiled._share_left(np.inf, 1e-2, 1e-12, forcing) == 0.1
+    assert compiled._share_left(0.2, 1e-2, 1e-12, forcing) == pytest.approx(0.05**2)
+    assert compiled._share_left(1e9, 1e-2, 1e-12, forcing) == 1e-3
+    assert compiled._share_left(0.2, 1e-2, 1e-3, forcing) == pytest.approx(0.3 * 0.1)  # no further than is asked
+    assert compiled._share_left(0.2, 1e-2, 9e-3, forcing) == 0.1
 
 
 def test_the_extent_and_the_limits_of_a_contact_are_found_at_once() -> None:
