@@ -20,6 +20,7 @@ from slipcore.detection.reconstructed_forces import for_reconstructed_forces
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
+from slipcore.method_choice import recommended_method
 from slipcore.options import Option, describe_options
 from slipcore.patch.friction import contact_friction
 from slipcore.patch_record import ContactFriction, Patch
@@ -96,6 +97,7 @@ __all__ = [
     "detect_slip",
     "element_forces",
     "for_reconstructed_forces",
+    "recommended_method",
     "stick_ratio",
     "warm_up",
 ]

@@ -76,12 +76,13 @@ def _of_logs(first: str, logs: "list[GraspLog]") -> "list[WorkPrecision]":
     """Of detection in the first log, by its name, and of a fit to all of them where they have slip enough."""
     from estimators import TooFewSamples
     from service.report import work_precision
-    from slipcore import InvalidInput, collect_samples, detect_slip
+    from slipcore import InvalidInput, collect_samples, detect_slip, recommended_method
 
     with shown_progress(f"detecting slip in {first} by every method") as tell:
         found = [work_precision.of_detection(logs[0], first, tell)]
     try:
-        grasps = [collect_samples(log, detect_slip(log)) for log in counted(logs, len(logs), "logs looked at")]
+        each = counted(logs, len(logs), "logs looked at")
+        grasps = [collect_samples(log, detect_slip(log, recommended_method(log))) for log in each]
         with shown_progress("fitting by every method") as tell:
             fits = work_precision.of_fits(grasps, f"friction of {len(logs)} grasp(s)", tell)
     except (TooFewSamples, InvalidInput) as none:

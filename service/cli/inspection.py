@@ -49,9 +49,9 @@ def inspect_log(
 ) -> InspectedLog:
     """Correct a log, reconstruct forces that it lacks, and detect slip in it."""
     from slipcore import LOOKAHEAD, detect_slip
-    from slipcore.defaults import DEFAULT_METHOD
+    from slipcore.method_choice import recommended_method
 
-    method = method or DEFAULT_METHOD
+    method = method or recommended_method(log)
     log, options = _corrected(log, sensor_model, method)
     log, reconstruction = _with_forces(log, gel)
     begin = perf_counter()

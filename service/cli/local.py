@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison
 
-FEW = 36
-"""Elements of an array, 6 × 6, up to which method "coarse" finds slip better than the default."""
-
 
 def detect(
     log: Log,
@@ -54,7 +51,6 @@ def detect(
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = inspect_log(grasp, method, sensor_model, gel)
-    _advise_method(seen.log, method)
     if picture is not None:
         from service.report.pictures import save, slip_over_time
 
@@ -82,7 +78,6 @@ def check(
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = inspect_log(grasp, method, sensor_model, gel)
-    _advise_method(seen.log, method)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
     without = _without_friction(seen.log)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
@@ -310,14 +305,6 @@ def _contact_record(log: "GraspLog", history: "SlipHistory") -> dict[str, Any] |
 
     found = contact_friction(log.time, history.patches)
     return None if found is None else asdict(found) | {"high": None if found.is_bound else found.high}
-
-
-def _advise_method(log: "GraspLog", method: str | None) -> None:
-    """Say which method is better, where the elements are few and none was named."""
-    rows, columns = log.grid
-    if method is None and rows * columns <= FEW and log.force is not None and log.has_displacement:
-        advice = "of so few, --method coarse finds slip better (docs/sensors.md#few-elements)"
-        typer.echo(f"{rows} × {columns} elements: {advice}", err=True)
 
 
 def _without_friction(log: "GraspLog") -> str | None:

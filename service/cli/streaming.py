@@ -40,8 +40,8 @@ def stream(
     json: Json = False,
 ) -> None:
     """Replay a grasp log to a service in real time, as a live stream that can be watched in the dashboard."""
-    from slipcore.defaults import DEFAULT_METHOD
     from slipcore.errors import InvalidInput
+    from slipcore.method_choice import recommended_method
     from stiction_client.stream import SlipStream
 
     if not isfinite(speed):
@@ -50,10 +50,9 @@ def stream(
         grasp = read_log(path, mapping, scale, frame_rate, rest)
     if grasp.displacement is None:
         raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
-    options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}
-    with SlipStream(
-        url, grasp.position, grasp.element_area, key=key, detector=method or DEFAULT_METHOD, **options
-    ) as live:
+    detector = method or recommended_method(grasp)
+    options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store, "detector": detector}
+    with SlipStream(url, grasp.position, grasp.element_area, key=key, **options) as live:
         page = f"{url.rstrip('/')}/live/{live.session}"
         typer.echo(f"to be watched at {page}", err=True)
         try:

@@ -27,6 +27,7 @@ from service.processes.fair_queue import FairQueue, QueueFull
 from service.processes.fair_threads import FairThreads
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
+from slipcore.method_choice import recommended_method
 from stiction_client import container
 
 MEMORY_BYTES = 2 * 2**30
@@ -65,18 +66,20 @@ FormatSettings = Mapping[str, float | str | Path | None]
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What the service notes of a log: name of its ``format``, ``duration`` in s."""
+    """What the service notes of a log: name of its ``format``, ``duration`` in s, ``method`` of detection for it."""
 
     format: str
     sensor: str
     frames: int
     duration: float
     grid: tuple[int, int]
+    method: str
 
 
 def describe(name: str, log: GraspLog) -> Description:
     """A log of this format in a few numbers."""
-    return Description(name, log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
+    duration = float(log.time[-1] - log.time[0])
+    return Description(name, log.sensor, len(log), duration, log.grid, recommended_method(log))
 
 
 def read_plain(path: Path, name: str) -> Description:

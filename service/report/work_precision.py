@@ -79,13 +79,13 @@ def of_scene(scene: "Scene", seconds: float, seed: int, progress: "Progress") ->
 
 
 def of_detection(log: "GraspLog", name: str, progress: "Progress") -> WorkPrecision:
-    """Every detector on a log: against its truth, or without one against the default detector."""
-    from slipcore.defaults import DEFAULT_METHOD
+    """Every detector on a log: against its truth, or without one against the detector that suits it."""
     from slipcore.detection.methods import METHODS
+    from slipcore.method_choice import recommended_method
 
     contact, slip = (None, None) if log.truth is None else (log.truth.contact, log.truth.slip_contact_factor)
-    found = []
-    for count, method in enumerate(sorted(METHODS, key=lambda method: method != DEFAULT_METHOD)):
+    found, first = [], recommended_method(log)
+    for count, method in enumerate(sorted(METHODS, key=lambda method: method != first)):
         progress(count / len(METHODS))
         history, seconds = _detected(log, method)
         if contact is None or slip is None:  # there is no truth, and this is the first

@@ -43,9 +43,10 @@ def detect_slip(
     have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
     smoothed, as far as the log's noise shows how widely, unless options give it, and takes reconstructed forces as
     ``for_reconstructed_forces`` says. A log without displacement is left to method "forces_only" where the
-    default would see nothing. ``options`` are the method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the
-    sensor model knows of noise and smoothing goes before their defaults. Raises ``InvalidInput`` as ``init`` does, and
-    for a log of another lattice than the sensor model's.
+    default would see nothing; which method suits a log best, ``recommended_method`` says. ``options`` are the
+    method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes
+    before their defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor
+    model's.
     """
     if not log.sees_along_surface:
         allowed = (

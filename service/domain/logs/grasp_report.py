@@ -15,7 +15,7 @@ from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Fact, Report
 from service.report.pictures import SlipOverTime, detected
 from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, check_log, detect_slip
-from slipcore.defaults import DEFAULT_METHOD
+from slipcore.method_choice import recommended_method
 
 METHOD = "auto"
 """By which a grasp alone is fitted."""
@@ -32,7 +32,7 @@ def report_of_log(log: GraspLog, name: str, method: str | None = None) -> Report
 def inspect_grasp(log: GraspLog, name: str, method: str | None = None) -> InspectedGrasp:
     """What is found in a log."""
     begin = perf_counter()
-    history = detect_slip(log, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+    history = detect_slip(log, method=method or recommended_method(log), lookahead=LOOKAHEAD)
     seconds = perf_counter() - begin
     found, none_because = collect(log, history, None)
     findings = check_log(log, history, found.elements)

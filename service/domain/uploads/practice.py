@@ -10,7 +10,6 @@ from service.domain.access.principal import Principal
 from service.domain.resources.context import Context
 from service.domain.resources.receive import CHUNK_BYTES
 from service.domain.uploads.upload import UploadRequest, upload
-from slipcore.defaults import DEFAULT_METHOD
 from stiction_client import container
 
 SEED = 0
@@ -27,7 +26,7 @@ async def _load(context: Context, ramp: Ramp, principal: Principal) -> None:
     request = UploadRequest(
         f"simulated {ramp.material}",
         None,
-        DEFAULT_METHOD,
+        None,
         container.CONTENT_TYPE,
         principal=principal,
         creates_material=True,

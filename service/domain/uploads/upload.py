@@ -45,14 +45,14 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
-    """What the uploader says of a log: its material, sensor and detector, type, length and encoding of its bytes, and
-    the settings that its format needs (``formats.read``); ``principal`` is who sends it. Where
-    ``creates_material`` is set, a material that is not known is made known with the log, or not at all.
+    """What the uploader says of a log: its material, sensor and detector (None: the one that suits the log), type,
+    length and encoding of its bytes, and the settings that its format needs (``formats.read``); ``principal`` is who
+    sends it. Where ``creates_material`` is set, a material that is not known is made known with the log, or not at all.
     """
 
     material: str | None
     sensor: str | None
-    detector: str
+    detector: str | None
     content_type: str | None = None
     content_length: int | None = None
     content_encoding: str = ""
@@ -149,7 +149,7 @@ def _check_before(context: Context, request: UploadRequest) -> int | None:
 
 def _check(context: Context, request: UploadRequest) -> int | None:
     """What can be checked before the bytes are there; returns the material's key, None where there is none yet."""
-    if request.detector not in METHOD_NAMES:
+    if request.detector is not None and request.detector not in METHOD_NAMES:
         raise InvalidValue("detector", request.detector, ", ".join(METHOD_NAMES))
     if request.sensor is not None:
         _sensor_name(request.sensor)
@@ -245,7 +245,7 @@ def _new_log(spool: Spool, found: Description, request: UploadRequest, material_
         sha256=spool.sha256,
         bytes=spool.size,
         format=found.format,
-        detector=request.detector,
+        detector=request.detector or found.method,
         material_id=material_id,
         sensor=_sensor_name(request.sensor or found.sensor),
         frames=found.frames,

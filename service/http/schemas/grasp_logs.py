@@ -11,7 +11,7 @@ from db.records import Detection, Finding, JobStatus, StoredGraspLog, Withdrawal
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.schemas.common import MOMENT_EXAMPLE, USUAL, Body, CursorText, Limit, Next, Reason
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
-from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
+from slipcore.defaults import METHOD_NAMES
 from slipcore.finding import Severity, severity_of
 
 FINDING_EXAMPLE: JsonDict = {
@@ -253,8 +253,12 @@ class UploadQuery(BaseModel):
     ] = None
     sensor: Annotated[str | None, Field(description="In place of the sensor that the log names")] = None
     detector: Annotated[
-        str, Field(description="Method of detection", json_schema_extra={"enum": list(METHOD_NAMES)})
-    ] = DEFAULT_METHOD
+        str | None,
+        Field(
+            description="Method of detection; without it the one that suits the log",
+            json_schema_extra={"enum": list(METHOD_NAMES)},
+        ),
+    ] = None
     scale: Annotated[float | None, Field(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])] = (
         None
     )

@@ -24,7 +24,7 @@ from service.http.schemas.materials import NewMaterial
 from service.web.forms import checked, read_form
 from service.web.materials import names
 from service.web.rendering import on_problem, render
-from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
+from slipcore.defaults import METHOD_NAMES
 
 router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
@@ -46,7 +46,7 @@ class NewUpload(BaseModel):
     material: str | None = None
     create: bool = False
     sensor: str | None = None
-    detector: str = DEFAULT_METHOD
+    detector: str | None = None
     format: str = formats.UNSPECIFIC_TYPES[1]
     scale: float | None = Field(default=None, ge=SCALE[0], le=SCALE[1])
     frame_rate: float | None = Field(default=None, ge=FRAME_RATE[0], le=FRAME_RATE[1])

@@ -225,11 +225,11 @@ def test_every_command_that_reads_logs_takes_what_a_table_leaves_out(
     assert "rest is 'nonsense'" in run(*command, dots, "--frame-rate", 30, "--rest", "nonsense")[2]
 
 
-def test_of_few_elements_a_better_method_is_named_where_none_was(run: Run, tmp_path: Path) -> None:
+def test_of_few_elements_the_detector_for_few_is_taken_where_none_was_named(run: Run, tmp_path: Path) -> None:
     few = tmp_path / "few.npz"
     container.write(tangential_ramp(points=4, pitch=3.8e-3, normal_force=6.0, marker_noise=1e-6, seed=1), few)
-    assert "4 × 4 elements: of so few, --method coarse finds slip better" in run("check", few)[2]
-    assert "coarse" not in run("check", few, "--method", "force_ratio")[2]
+    assert json.loads(run("detect", few, "--json")[1])["method"] == "coarse"
+    assert json.loads(run("detect", few, "--method", "filter", "--json")[1])["method"] == "filter"
 
 
 def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_reads(run: Run, tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
     client = reach(key=key, **{setting: 1})
     assert send(client, content).status_code == 202
     context, key_id = client.app.state.context, keys.key_id(key)
-    found = Description("npz", "finger", 2, 1.0, (1, 1))
+    found = Description("npz", "finger", 2, 1.0, (1, 1), "filter")
     with context.blobs.spool() as spool:
         spool.path.write_bytes(b"frames")
         request = upload.UploadRequest(None, None, "filter", principal=Principal(key_id=key_id))

@@ -106,7 +106,7 @@ def test_what_makes_a_log_doubtful_stands_on_its_page(
 def test_the_detector_that_ran_is_told_where_a_log_has_forces_alone(
     client: httpx.Client, ramp: GraspLog, upload: Any, wait: Any, fitted: Any, page_of: Callable[[str], Any]
 ) -> None:
-    accepted = upload(client, encode(replace(ramp, displacement=None))).json()
+    accepted = upload(client, encode(replace(ramp, displacement=None)), detector="filter").json()
     wait(client, accepted["job"]["id"])
     assert "forces_only; asked for: filter" in page_of(f"/logs/{accepted['id']}").text
     assert "asked for" not in page_of(f"/logs/{fitted['id']}").text

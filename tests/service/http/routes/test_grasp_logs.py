@@ -10,6 +10,7 @@ import pytest
 
 from service import formats
 from slipcore import LOOKAHEAD, GraspLog, collect_samples, contact_friction, detect_slip
+from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import CONTENT_TYPE, encode
 from tests.service.stored import wait_for_empty_spool
 
@@ -113,6 +114,17 @@ def test_the_detector_is_the_uploaders_choice(
     assert (first.status_code, other.status_code) == (202, 202)
     wait(client, other.json()["job"]["id"])
     assert client.get(other.headers["location"]).json()["detection"]["method"] == "strain_rate_literal"
+
+
+def test_without_the_uploaders_choice_few_elements_are_looked_at_by_the_detector_for_few(
+    client: httpx.Client, upload: Upload, wait: Wait
+) -> None:
+    content = encode(tangential_ramp(points=4, pitch=3.8e-3, normal_force=6.0, marker_noise=1e-6, seed=1))
+    for choice, method in (({}, "coarse"), ({"detector": "coarse"}, "coarse"), ({"detector": "filter"}, "filter")):
+        accepted = upload(client, content, **choice)
+        assert accepted.status_code == (200 if choice == {"detector": "coarse"} else 202)
+        wait(client, accepted.json()["job"]["id"])
+        assert client.get(accepted.headers["location"]).json()["detection"]["method"] == method
 
 
 def test_the_same_upload_twice_is_one_log(
