@@ -107,6 +107,8 @@ LEROBOT_INFO = "meta/info.json"
 ZIP = b"PK\x03\x04"
 """How a zip begins."""
 
+KNOWN = f"{', '.join(FORMATS)} ({PAGE})"
+"""What a file may be, as people call it."""
 SNIFFED_BYTES = 4096
 """Enough for the lines before a table and its header."""
 
@@ -251,10 +253,8 @@ def _sniff(path: Path, is_mapped: bool) -> str:
         header = start.splitlines()[0].decode("utf-8", "replace")[:60]
         raise UnsupportedFormat("file", f"a table that begins with {header!r}", TABLES)
     if not start:
-        raise UnsupportedFormat("file", "empty")
-    raise UnsupportedFormat(
-        "file", f"of no known format (it starts with {start[:4]!r})", f"{', '.join(FORMATS)} ({PAGE})"
-    )
+        raise UnsupportedFormat("file", "empty", KNOWN)
+    raise UnsupportedFormat("file", f"of no known format (it starts with {start[:4]!r})", KNOWN)
 
 
 def _sniff_zip(path: Path) -> str:

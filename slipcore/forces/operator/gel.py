@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any
 
 from slipcore.errors import InvalidInput
@@ -54,9 +54,15 @@ class Gel:
         """
         names = [each.name for each in fields(cls)]
         try:
-            return cls(**{name: _read(name, value) for name, value in properties.items()})
+            read = {name: _read(name, value) for name, value in properties.items()}
         except (AttributeError, TypeError) as error:
             raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
+        needed = [each.name for each in fields(cls) if each.default is MISSING]
+        wrong = [f"with the unknown {name!r}"[:120] for name in read if name not in names]
+        wrong += [f"without {name}" for name in needed if name not in read]
+        if wrong:
+            raise InvalidInput("gel", wrong[0], f"numbers named {', '.join(names)}")
+        return cls(**read)
 
     def to_json(self) -> dict[str, float | None]:
         """As ``from_json`` reads it."""
