@@ -23,7 +23,7 @@ ROWS = 21
     END,  # and that it stuck again if it slipped
     HEADING_X,  # mean direction in which the object moves over it
     HEADING_Y,
-    OPPOSED,  # 0 unless its force points against that direction; else 1, and how much that counts, 0 to 1
+    OPPOSED,  # 0 unless its force points against that direction; else 1 plus the share to which that counts: 1 to 2
     TOUCH_DEPTH,  # how deep it lay in the last frame before it touched, m
     SPRING_X,  # what it has taken up of the object's motion since then, m (``slip_limit``)
     SPRING_Y,
