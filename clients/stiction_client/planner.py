@@ -185,7 +185,7 @@ def required_normal_force(
     given = (load, moment, loaded.unit, velocity, probability, limit, count)
     if any(isinstance(each, np.ndarray) for each in given):
         return _many(question, given)
-    return _one(question, tangential_load)
+    return _one(question, tangential_load, _beside(float(torque), float(safety_factor)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -278,7 +278,13 @@ def _shares(
     return load, turns / (arm + (arm == 0.0))
 
 
-def _one(question: _Question, tangential_load: Number) -> RequiredForce:
+def _beside(torque: float, safety_factor: float) -> str:
+    """What is to be held beside the load, and by how much more, as a refusal names it."""
+    turned = f", beside a torque of {torque:g} N·m" if torque > 0.0 else ""
+    return turned + (f", with a safety factor of {safety_factor:g}" if safety_factor > 1.0 else "")
+
+
+def _one(question: _Question, tangential_load: Number, beside: str) -> RequiredForce:
     loaded, most = question.loaded, float(question.loaded.root(question.limit))
     low, high, holds = loaded.interval(most)
     best = loaded.best(most)
@@ -289,7 +295,7 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
             float(tangential_load),
             largest,
             float(loaded.force(best)),
-            _asked(question),
+            _asked(question, beside),
             str(_causes(question)),
             question.model.domain.normal_force[1],
         )
@@ -352,6 +358,6 @@ def _causes(question: _Question) -> Any:
     return np.select([~np.asarray(possible), limited, unobserved], ["physics", "limit", "range"], "ignorance")
 
 
-def _asked(question: _Question) -> str:
+def _asked(question: _Question, beside: str) -> str:
     limited = "" if math.isinf(question.limit) else f", normal force up to {question.limit:g} N"
-    return f"slip probability {question.probability:g}{limited}"
+    return f"slip probability {question.probability:g}{beside}{limited}"

@@ -15,6 +15,7 @@ from stiction_client import (
     NoFeasibleForce,
     Scale,
     Scales,
+    grasp,
     required_normal_force,
 )
 from stiction_client.quantile import FrictionQuantile, _peak_of_hyperbola
@@ -271,6 +272,16 @@ def test_a_limit_on_the_force_bounds_answer_and_interval(make_model: Make) -> No
     assert answer.largest_load == pytest.approx(10.0 * (0.5 - 1.0 / 6.0), rel=1e-14)
     with pytest.raises(NoFeasibleForce, match=r"normal force up to 5 N\); the largest load held so is 2.08333 N"):
         required_normal_force(model, 3.0, contact_area=AREA, normal_force_limit=5.0)
+
+
+def test_what_is_to_be_held_beside_the_load_is_named_where_nothing_holds_it(make_model: Make) -> None:
+    """A torque was passed over, and the refusal read as if so little load were too much."""
+    model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)
+    contacts = grasp(AREA)
+    with pytest.raises(NoFeasibleForce, match=r"holds 0\.1 N \(slip probability 0\.001, beside a torque of 5 N·m\)"):
+        required_normal_force(model, 0.1, contacts=contacts, torque=5.0)
+    with pytest.raises(NoFeasibleForce, match=r"\(slip probability 0\.001, with a safety factor of 100\)"):
+        required_normal_force(model, 0.1, contacts=contacts, safety_factor=100.0)
 
 
 def test_a_limit_that_is_just_what_is_needed_holds(make_model: Make) -> None:
