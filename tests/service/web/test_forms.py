@@ -240,6 +240,8 @@ def test_a_question_without_an_answer_stays_in_its_form(
     assert answer.status_code == status
     assert told in answer.text
     assert 'name="tangential_load" inputmode="decimal" value="' in answer.text
+    is_marked = 'aria-invalid="true" aria-describedby="tangential_load-allowed"' in answer.text
+    assert is_marked == ("tangential_load=x" in query)
 
 
 @ON_SQLITE
