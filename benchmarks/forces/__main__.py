@@ -47,7 +47,7 @@ from benchmarks.forces import stream as gel_stream
 from benchmarks.forces import uneven as gel_uneven
 from benchmarks.forces.peers import PEERS, export, imported, made
 from benchmarks.forces.presses import calibrated, calibration_table
-from benchmarks.forces.scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
+from benchmarks.forces.scenes import CONTACTS, LATTICES, Truth, anywhere, press, repeated, seen
 from benchmarks.pages import options, picture_folder, save, table, write
 from slipcore import GraspLog
 from slipcore.forces import Gel, reconstruct
@@ -74,6 +74,7 @@ PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel cal
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
 SLIP_GROUP, HEIGHT_GROUP, UNEVEN_GROUP = "slip by sensor", "height maps", "uneven gel"
 OVER_TIME_GROUP = "over time"
+ANYWHERE_GROUP, ANYWHERE_PRESSES = "coverage anywhere", 4
 COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
@@ -111,7 +112,7 @@ class Score:
 
     ``resultant`` and ``elements``: tangential, normal; ``pooled``: these averaged over squares as wide as the
     kernel, against the truth averaged so; ``area`` of contact found over the true one; ``seconds`` of CPU: to set up,
-    a frame.
+    a frame; ``squares``, of the mean force: mean squares of errors and of stated deviations.
     """
 
     case: Case
@@ -125,6 +126,7 @@ class Score:
     kernel: float = np.nan
     condition: float = np.nan
     inside: dict[str, tuple[int, int]] = field(default_factory=dict)
+    squares: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def cases(group: str) -> Iterator[Case]:
@@ -158,6 +160,13 @@ def covered() -> Iterator[Case]:
             yield from (replace(base, noise=noise, contact=contact) for noise in NOISES for contact in COVERED_CONTACTS)
 
 
+def anywhere_covered() -> Iterator[Case]:
+    """Those of them in the plane alone on 5 mm, where intervals are hardest."""
+    for case in covered():
+        if not case.depth_seen and case.gel == "5 mm" and case.noise > 0.0:
+            yield replace(case, group=ANYWHERE_GROUP)
+
+
 def compared() -> list[Case]:
     """Cases on which peers are tried."""
     return [replace(Case(PEERS_GROUP, depth), noise=noise) for depth in (True, False) for noise in NOISES]
@@ -177,9 +186,17 @@ def forces_of(log: GraspLog) -> FloatArray:
     return log.force
 
 
-def score(case: Case, draws: int) -> Score:
+def shown_anywhere(case: Case, number: int) -> tuple[Truth, GraspLog]:
+    """A press of another size, direction, place and load for each number, and what the sensor shows of it."""
+    rng, lattice = np.random.default_rng([number, 41]), LATTICES[case.lattice]
+    x, y = rng.uniform(-0.75e-3, 0.75e-3, 2)
+    steps = ((rng.uniform(0.4, 0.6), 0.0), (1.0, rng.uniform(0.3, 0.6)), (1.0, rng.uniform(0.8, 1.0)))
+    truth = press(anywhere(case.contact, rng), case.true_gel(), lattice, (float(x), float(y)), steps)
+    return truth, seen(truth.log, case.noise, case.depth_seen, rng)
+
+
+def score(case: Case, truth: Truth, log: GraspLog) -> Score:
     """The reconstruction of one press."""
-    truth, log = shown(case, draws)
     true, gel = forces_of(truth.log), replace(case.true_gel(), **WRONG.get(case.wrong, {}))
     began = time.process_time()
     found = reconstruct(log, gel, -truth.total[:, 2] if case.given else None, case.noise, case.criterion)
@@ -204,7 +221,21 @@ def score(case: Case, draws: int) -> Score:
             MOMENT: (int(turned.sum()), len(turned)),
             **inside("element", found.force - true, found.deviation, touched),
         },
+        {
+            **squares("resultant", found.resultant - truth.total, found.resultant_deviation, truth.total),
+            **squares("element", (found.force - true)[touched], found.deviation[touched], true[touched]),
+        },
     )
+
+
+def squares(what: str, error: FloatArray, deviation: FloatArray, true: FloatArray) -> dict[str, tuple[float, float]]:
+    """Mean squares of errors and of stated deviations, both over the mean square of true normal forces."""
+    of_true = float(np.mean(true[..., 2] ** 2))
+    parts = {"tangential": np.s_[..., :2], "normal": np.s_[..., 2]}
+    return {
+        f"{what}, {axis}": (float(np.mean(error[part] ** 2)) / of_true, float(np.mean(deviation[part] ** 2)) / of_true)
+        for axis, part in parts.items()
+    }
 
 
 def inside(what: str, error: FloatArray, deviation: FloatArray, chosen: BoolArray) -> dict[str, tuple[int, int]]:
@@ -268,6 +299,24 @@ def coverage(scores: Iterable[Score], names: Sequence[str] = QUANTITIES) -> list
     """Shares of intervals that hold the truth, by quantity."""
     held = [np.sum([entry.inside[name] for entry in scores], axis=0) for name in names]
     return [f"{inside / count:.0%}" for inside, count in held]
+
+
+def widths(scores: Sequence[Score], name: str) -> str:
+    """Root mean squares of errors and of stated deviations, in percent of the normal force."""
+    return percent(np.sqrt(np.mean([entry.squares[name] for entry in scores], axis=0)))
+
+
+def anywhere_table(scores: Sequence[Score]) -> str:
+    """How many intervals hold the truth, by lattice, noise and contact, beside errors and deviations."""
+    of_each = (each for name in QUANTITIES for each in (name, "error / deviation"))
+    columns = ("markers", "noise, µm", "contact", *of_each, "frames")
+    rows: list[tuple[object, ...]] = []
+    for case in dict.fromkeys(entry.case for entry in scores):
+        own = [entry for entry in scores if entry.case == case]
+        cells = [each for name in QUANTITIES for each in (*coverage(own, [name]), widths(own, name))]
+        frames = sum(entry.inside["resultant, normal"][1] for entry in own)
+        rows.append((case.lattice, f"{1e6 * case.noise:g}", case.contact, *cells, frames))
+    return table(columns, rows)
 
 
 def errors_table(scores: list[Score]) -> str:
@@ -387,12 +436,23 @@ def cover(arguments: argparse.Namespace) -> None:
     """Whether stated intervals hold the truth as often as they say; a line a case while it goes on."""
     found = list[Score]()
     for case in covered():
-        found.append(score(case, COVERAGE_DRAWS))
+        found.append(score(case, *shown(case, COVERAGE_DRAWS)))
         about = f"{case.seen}, {case.gel}, {case.lattice}, {case.contact}, {1e6 * case.noise:g} µm"
         print(f"{about}: {', '.join(coverage(found[-1:]))}", flush=True)
     text = coverage_table(found)
     print(f"{COVERAGE_GROUP}\n\n{text}\n", flush=True)
     write([asdict(each) for each in found], {COVERAGE_GROUP: text}, arguments, "forces-coverage.json")
+
+
+def cover_anywhere(arguments: argparse.Namespace) -> None:
+    """The same where presses differ in size, direction, place and load; a line a case while it goes on."""
+    found = list[Score]()
+    for case in anywhere_covered():
+        found += [score(case, *shown_anywhere(case, k)) for k in range(ANYWHERE_PRESSES)]
+        print(f"{case.lattice}, {case.contact}, {1e6 * case.noise:g} µm", flush=True)
+    text = anywhere_table(found)
+    print(f"{ANYWHERE_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {ANYWHERE_GROUP: text}, arguments, "forces-coverage-anywhere.json")
 
 
 def refer(arguments: argparse.Namespace) -> None:
@@ -453,6 +513,7 @@ def main() -> None:
         OVER_TIME_GROUP: smooth,
         SATURATION_GROUP: saturate,
         COVERAGE_GROUP: cover,
+        ANYWHERE_GROUP: cover_anywhere,
         REFERENCES_GROUP: refer,
         FRICTION_GROUP: grip,
         SLIP_GROUP: slip,
@@ -480,7 +541,7 @@ def main() -> None:
             continue
         scores = []
         for case in compared() if group == PEERS_GROUP else cases(group):
-            scores.append(score(case, draws))
+            scores.append(score(case, *shown(case, draws)))
             if group == PEERS_GROUP:
                 scores += [peer_score(case, name, draws) for name in PEERS]
         if group == PEERS_GROUP:

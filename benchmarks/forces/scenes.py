@@ -170,8 +170,21 @@ def traction(shape: Shape, press: float, shear: float, centre: tuple[float, floa
     return np.asarray(cells * (press * NORMAL_FORCE / (cells[2].sum() * CELL**2)))
 
 
+def anywhere(contact: str, rng: np.random.Generator) -> Shape:
+    """A contact of up to a quarter more or less in size, turned at random."""
+    shape, scale, angle = CONTACTS[contact], rng.uniform(0.75, 1.2), rng.uniform(0.0, 2.0 * np.pi)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+    def turned(x: FloatArray, y: FloatArray, press: float, shear: float) -> tuple[FloatArray, FloatArray]:
+        along, across = np.tensordot(turn, np.stack((x, y)), 1) / scale
+        pressure, slid = shape(along, across, press, shear)
+        return pressure, np.tensordot(turn.T, slid, 1)
+
+    return turned
+
+
 def press(
-    contact: str,
+    contact: str | Shape,
     gel: Gel,
     lattice: Lattice,
     centre: tuple[float, float] = (0.0, 0.0),
@@ -182,7 +195,7 @@ def press(
     kernel, moved, force, area, total, moment = influence(gel), [], [], [], [], []
     middle_of = CELL * (np.arange(SIDE) - SIDE // 2)
     for step in steps:
-        loads = traction(CONTACTS[contact], *step, centre)
+        loads = traction(CONTACTS[contact] if isinstance(contact, str) else contact, *step, centre)
         everywhere = oaconvolve(kernel, loads[None], mode="same", axes=(-2, -1)).sum(axis=1)
         middle = slice(SIDE // 2, SIDE // 2 + SIDE)
         moved.append(everywhere[:, middle, middle][:, rows][:, :, columns])

@@ -196,7 +196,7 @@ def of_patches(known: Known) -> list[Row]:
 
 def pressed() -> dict[str, float]:
     """Of forces from displacement: error of resultants and of the field, in logarithms, and intervals that hold."""
-    scores = [of_gels.score(case, 1) for case in PRESSES]
+    scores = [of_gels.score(case, *of_gels.shown(case, 1)) for case in PRESSES]
     held = np.sum([pair for each in scores for pair in each.inside.values()], axis=0)
     of_resultants, of_fields = (np.mean([getattr(each, name) for each in scores]) for name in ("resultant", "elements"))
     error_and_cost = {"resultants": np.log(of_resultants), "fields": np.log(of_fields), "intervals": held[0] / held[1]}

@@ -13,6 +13,8 @@ from benchmarks.forces.__main__ import (
     STICTION,
     Case,
     Score,
+    anywhere_covered,
+    anywhere_table,
     cases,
     compared,
     coverage,
@@ -23,6 +25,8 @@ from benchmarks.forces.__main__ import (
     picture,
     pooled,
     score,
+    shown,
+    shown_anywhere,
 )
 from benchmarks.forces.peers import PEERS, export, imported, pseudo_inverse
 from benchmarks.forces.presses import Calibration, calibration_table
@@ -96,7 +100,7 @@ def test_errors_are_relative_and_tell_directions_apart() -> None:
 
 def test_a_case_is_scored_tabled_and_drawn() -> None:
     case = Case("lattice", depth_seen=True, lattice="10 × 7")
-    found = score(case, draws=2)
+    found = score(case, *shown(case, 2))
     assert found.method == STICTION
     assert max(found.resultant) < 0.02
     assert max(found.elements) < 0.15
@@ -108,7 +112,8 @@ def test_a_case_is_scored_tabled_and_drawn() -> None:
 
 def test_a_gel_described_too_stiff_gives_forces_too_large_by_as_much() -> None:
     case = Case("wrong description", depth_seen=True, lattice="10 × 7", noise=0.0)
-    right, wrong = score(case, 1), score(replace(case, wrong="E + 10 %"), 1)
+    truth, log = shown(case, 1)
+    right, wrong = (score(each, truth, log) for each in (case, replace(case, wrong="E + 10 %")))
     assert right.resultant[1] < 0.02
     assert wrong.resultant[1] == pytest.approx(0.1, abs=0.02)
 
@@ -197,6 +202,19 @@ def test_intervals_are_counted_over_contacts_and_apart_by_noise() -> None:
     first, second = coverage_table(own).splitlines()[2:]
     assert first == "| with z | half-space | 20 × 20 | 0 | 75% | 75% | 75% | 75% | 75% | 8 |"
     assert second.endswith("| 4 |")
+    wide = [replace(each, squares=dict.fromkeys(QUANTITIES, (1e-4, 4e-4))) for each in own]
+    row = anywhere_table(wide).splitlines()[2]
+    assert row == f"| 20 × 20 | 0 | sphere |{' 75% | 1 / 2 |' * 4} 4 |"
+
+
+def test_each_press_of_the_coverage_is_another_of_the_same_force() -> None:
+    case = next(case for case in anywhere_covered() if case.contact == "ring" and case.lattice == "10 × 7")
+    presses = [shown_anywhere(case, k)[0] for k in (1, 2, 1)]
+    np.testing.assert_array_equal(presses[0].total, presses[2].total)
+    np.testing.assert_allclose([each.total[1:, 2] for each in presses], -10.0, rtol=1e-9)
+    assert abs(presses[0].area[1] / presses[1].area[1] - 1.0) > 0.05
+    one, other = (each.total[2, :2] for each in presses[:2])
+    assert abs(one[0] * other[1] - one[1] * other[0]) > 0.1 * np.hypot(*one) * np.hypot(*other)
 
 
 def test_an_independent_scene_is_read_with_the_load_that_it_was_made_with() -> None:
@@ -215,6 +233,7 @@ def test_criteria_are_tried_on_the_same_presses_and_named_in_their_rows() -> Non
     assert len(by_press) == 4
     assert all(names == {"evidence", "gcv", "discrepancy"} for names in by_press.values())
     smooth = replace(tried[0], lattice="10 × 7", criterion="discrepancy")
-    scores = [score(replace(smooth, criterion="evidence"), 1), score(smooth, 1)]
+    truth, log = shown(smooth, 1)
+    scores = [score(each, truth, log) for each in (replace(smooth, criterion="evidence"), smooth)]
     assert scores[1].elements[0] > 1.02 * scores[0].elements[0]
     assert "5 mm, by discrepancy | sphere" in errors_table(scores)
