@@ -15,7 +15,10 @@ from tests import forking
     ("wrong", "why"),
     [
         (["--data-folder", "/proc/x"], "STICTION_DATA_FOLDER (--data-folder) is '/proc/x', which is in a folder that"),
-        (["--database-url", "mysql://x/y"], "begins with mysql://; allowed: sqlite:// or postgresql://"),
+        (
+            ["--database-url", "mysql://x/y"],
+            "STICTION_DATABASE_URL is 'mysql://x/y'; allowed: a SQLAlchemy URL that begins with sqlite:// or postgresql://",
+        ),
         (["--host", "nowhere.invalid"], "STICTION_HOST (--host) is 'nowhere.invalid' and STICTION_PORT (--port) 0: "),
         (["--host", "192.0.2.1"], "STICTION_HOST (--host) is '192.0.2.1' and STICTION_PORT (--port) 0: "),
         (

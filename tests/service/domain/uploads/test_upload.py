@@ -122,7 +122,7 @@ def test_a_truncated_file_is_refused(client: httpx.Client, upload: Upload, conte
     ("content", "content_type", "allowed"),
     [
         (b"time,x,y\n0,1,2\n", "application/octet-stream", "a mapping that says which columns are what"),
-        (b"", "application/octet-stream", NPZ),
+        (b"", "application/octet-stream", "npz, tac3d, tracked markers"),
         (b"PK\x03\x04", "text/html", NPZ),
     ],
 )
