@@ -683,9 +683,16 @@ def test_an_address_of_no_service_is_refused_before_the_first_call(client: Any, 
 
 
 @pytest.mark.parametrize("url", ["HTTP://x", "https://x:65535/behind/a/proxy/", "http://[::1]:1"])
-def test_an_address_of_a_service_is_taken(url: str) -> None:
-    with FrictionClient(url):
-        pass
+def test_an_address_of_a_service_is_taken_as_it_stands(url: str) -> None:
+    asked: list[str] = []
+
+    def service(request: httpx.Request) -> httpx.Response:
+        asked.append(str(request.url))
+        return httpx.Response(200, json={"items": [], "next": None})
+
+    with FrictionClient(url, transport=httpx.MockTransport(service)) as client:
+        assert client.materials() == []
+    assert asked[0].startswith(str(httpx.URL(url.rstrip("/"))) + "/v1/materials")
 
 
 @pytest.mark.parametrize("seconds", [-1.0, math.nan, "60", None, True])
