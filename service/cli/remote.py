@@ -268,9 +268,9 @@ def _print_broken_off(done: list[dict[str, Any]], sources: list[Source], json: b
     """What became of each log where an error or Ctrl-C ended the uploads, and how to go on; nothing of a first one."""
     if not done:
         return
-    under_way, *others = [source.name for source in sources[len(done) :]]
-    left = [{"file": under_way, "status": "not known", "reason": "it may have been sent"}]
-    left += [{"file": name, "status": "not sent"} for name in others]
+    left = [{"file": source.name, "status": "not sent"} for source in sources[len(done) :]]
+    if left:  # Ctrl-C may come when all are done
+        left[0] |= {"status": "not known", "reason": "it may have been sent"}
     _print_uploads(done + left, json)
     again = "the same command sends the rest, and stores none twice"
     typer.echo(f"{len(done)} of {len(sources)} logs are done; {again}", err=True)

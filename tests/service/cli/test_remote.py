@@ -3,7 +3,7 @@
 import inspect
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -403,6 +403,26 @@ def test_uploads_that_break_off_say_what_is_done_and_how_to_go_on(
     told = json.loads(out)["uploads"]
     assert [each["status"] for each in told] == [JOB.status, JOB.status, "not known", "not sent"]
     assert [each["file"] for each in told] == [path.name for path in paths]
+
+
+def test_an_interrupt_when_all_uploads_are_done_loses_none_of_them(
+    client: Mock, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As progress raises it at its end, where one was lost before."""
+
+    def interrupted(things: Iterable[Any], *_: Any) -> Iterator[Any]:
+        yield from things
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(remote, "counted", interrupted)
+    (tmp_path / "a.npz").touch()
+    client.upload.return_value, client.wait.return_value = Mock(id="1f", job=JOB), JOB
+    client.grasp_log.return_value = Mock(detection=None)
+    with pytest.raises(SystemExit) as left:
+        main(["upload", str(tmp_path / "a.npz"), "--json"])
+    out, err = capsys.readouterr()
+    assert (left.value.code, "1 of 1 logs are done" in err) == (INTERRUPTED, True)
+    assert [each["status"] for each in json.loads(out)["uploads"]] == [JOB.status]
 
 
 def test_a_first_upload_that_fails_says_no_more_than_why(
