@@ -14,5 +14,11 @@ def recommended_method(log: GraspLog) -> str:
     """
     if not log.has_displacement:
         return FORCES_METHOD
-    measured = log.force is not None and not log.has_reconstructed_force
-    return FEW_METHOD if measured and prod(log.grid) <= FEW_ELEMENTS else DEFAULT_METHOD
+    return method_with_displacement(log.grid, log.force is not None and not log.has_reconstructed_force)
+
+
+def method_with_displacement(grid: tuple[int, int], measures_force: bool) -> str:
+    """The same of arrays whose displacement is known, as of a live stream's frames, by their ``grid`` and whether they
+    have forces that are measured.
+    """
+    return FEW_METHOD if measures_force and prod(grid) <= FEW_ELEMENTS else DEFAULT_METHOD

@@ -39,7 +39,8 @@ ANSWER_TIMEOUT = 30.0
 class SlipStream:
     """One grasp, frame by frame; use it as a context manager.
 
-    ``position`` [n, m, 3] m at rest, ``element_area`` m². With ``keep`` the frames can be stored as a grasp log of
+    ``position`` [n, m, 3] m at rest, ``element_area`` m². Without a ``detector`` the service takes the one that suits
+    such frames. With ``keep`` the frames can be stored as a grasp log of
     ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
     ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
     ``known``, and where it has none recognises which of ``materials`` this is; frames then need forces, or a ``sensor``
@@ -55,7 +56,7 @@ class SlipStream:
         element_area: float,
         *,
         key: str | None = None,
-        detector: str = "filter",
+        detector: str | None = None,
         sensor: str = "stream",
         material: str | None = None,
         keep: bool = False,
@@ -68,11 +69,14 @@ class SlipStream:
         self._headers = {"Authorization": f"Bearer {key}"} if key else {}
         self._open = ExitStack()
         self._session, self._number, self._answered = "", 0, -1
+        self._detector: str | None = None
         self._findings: tuple[Finding, ...] = ()
         self._waiting: deque[tuple[int, bytes]] = deque()
         opening: dict[str, Any] = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2]}
         opening |= {"element_area": within("element_area", element_area, 0.0, 1.0, "m²")}
-        opening |= {"detector": detector, "sensor": sensor, "material": material, "keep": keep}
+        opening |= {"sensor": sensor, "material": material, "keep": keep}
+        if detector is not None:
+            opening["detector"] = detector
         if control is not None:
             opening["control"] = _control(control) | {"known": known}
             if materials:
@@ -91,6 +95,11 @@ class SlipStream:
     def session(self) -> str:
         """The session's name; the service shows it to people at ``/live/`` and this."""
         return self._session
+
+    @property
+    def detector(self) -> str | None:
+        """Method of detection; None until the first frame's answer, where only that frame shows which one suits."""
+        return self._detector
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -143,7 +152,7 @@ class SlipStream:
         number = answer.get("number")
         if not isinstance(number, int) or not self._answered < number < self._number or not _has_sound_command(answer):
             raise self._unexpected(answer)
-        self._answered = number
+        self._answered, self._detector = number, answer.get("detector", self._detector)
         while self._waiting and self._waiting[0][0] <= self._answered:
             self._waiting.popleft()
         return answer
@@ -206,7 +215,7 @@ class SlipStream:
             self._findings = tuple(Finding.from_json(each) for each in answer.get("findings", ()))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise self._unexpected(answer) from error
-        self._session = session
+        self._session, self._detector = session, answer.get("detector", self._detector)
         return connection
 
     def _try(self, do: Any) -> Any:

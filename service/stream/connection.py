@@ -114,7 +114,7 @@ class _Connection:
     async def _begin(self, first: Incoming) -> tuple[Session, list[dict[str, Any]]]:
         """The session, and the answers that its client has missed."""
         if isinstance(first, Open):
-            await check_target(self._context, self._upload(first))
+            await check_target(self._context, self._upload(first, first.detector))
             address, model = self._principal.address or "", await self._known(first)
             (gel, findings), materials = await self._gel(first), await self._candidates(first)
             session = await self._streams.open(first, self._principal.key_id, address, model, gel, materials)
@@ -171,7 +171,8 @@ class _Connection:
         raise End(IN_USE, "the session goes on in another connection")
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
-        await self._send({"type": "opened", "session": session.id, "next": session.next, "findings": session.findings})
+        opened = {"type": "opened", "session": session.id, "next": session.next}
+        await self._send(opened | {"detector": session.method, "findings": session.findings})
         for answer in missed:
             await self._send(answer)
 
@@ -221,6 +222,7 @@ class _Connection:
             if frame.number < 0:
                 raise InvalidInput("number", frame.number, "0 or more")
             answer, shown = await self._detect(session, frame)
+            session.method = answer["detector"]
             if shown is not None:
                 session.broadcast.publish(shown)
         except InvalidInput as error:
@@ -260,12 +262,12 @@ class _Connection:
             found = await self._streams.write(session, spool.path, opening.sensor)
             share = self._principal.share
             stored = await self._context.store_threads.run(
-                share, self._store, spool, found, self._upload(opening), is_long=True
+                share, self._store, spool, found, self._upload(opening, session.method), is_long=True
             )
         return {"type": "finished", "grasp_log": stored, "findings": session.findings}
 
-    def _upload(self, opening: Open) -> UploadRequest:
-        return UploadRequest(opening.material, opening.sensor or None, opening.detector, principal=self._principal)
+    def _upload(self, opening: Open, method: str | None) -> UploadRequest:
+        return UploadRequest(opening.material, opening.sensor or None, method, principal=self._principal)
 
     async def _receive(self) -> Sent:
         event = await self._socket.receive()

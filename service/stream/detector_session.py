@@ -69,7 +69,8 @@ class DetectorSession:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
     gripper ``reported`` in them; and the controller of the grip, where one was asked for.
 
-    ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``findings``: what its first
+    Where ``chooses_detector`` is set, the first frame decides which one suits. ``forces`` are reconstructed where its
+    sensor's gel is known and its frames have none. ``findings``: what its first
     frame shows to cost it friction. ``friction`` is what its client is told, ``expected`` what those are who watch it;
     ``begun``: time of its first frame, s.
     """
@@ -80,6 +81,7 @@ class DetectorSession:
     moments: "Moments"
     limit: MemoryLimit
     kept: list[Frame] | None
+    chooses_detector: bool = False
     reported: list[float | None] = field(default_factory=list)
     report_deviation: float | None = None
     most_reported: float = 0.0
@@ -96,6 +98,11 @@ class DetectorSession:
     expected: dict[str, float] | None = None
     held_bytes: int = 0
     begun: float | None = None
+
+    @property
+    def method(self) -> str:
+        """Its method of detection."""
+        return self.detector.state.setup.method
 
     @property
     def all_bytes(self) -> int:

@@ -37,6 +37,7 @@ from slipcore import (
 from slipcore.checks.recording import begun_in_contact
 from slipcore.defaults import FilterOptions
 from slipcore.frames import check_displacement, check_gripper_report, check_span
+from slipcore.method_choice import method_with_displacement
 from stiction_client import container
 
 MAX_KEPT_BYTES = 64 * 2**20
@@ -58,14 +59,15 @@ def open_session(
     position: Numbers,
     grid: tuple[int, int],
     area: float,
-    method: str,
+    method: str | None,
     keep: bool,
     limit: MemoryLimit,
     options: SessionOptions | None = None,
-) -> None:
-    """Begin a session within the memory ``limit``.
+) -> str | None:
+    """Begin a session within the memory ``limit``; its method of detection, None where the first frame decides.
 
-    Raises ``InvalidInput`` for what cannot be a sensor or a controller, or has no room.
+    Without a ``method`` it has the one that suits arrays of its size with such frames. Raises ``InvalidInput`` for what
+    cannot be a sensor or a controller, or has no room.
     """
     control, model, gel, materials = options or SessionOptions()
     rows, columns = grid
@@ -74,13 +76,16 @@ def open_session(
     at_rest = _array("position", position, (rows, columns, 3))
     held = WINDOW * 3 * at_rest.nbytes  # of the frames that are looked at, each with forces and normals
     _check_room(held, limit)
-    detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
+    without, with_forces = (method or method_with_displacement((rows, columns), measures) for measures in (False, True))
+    detector, moments = slipcore.SlipDetector(at_rest, area, without), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model, materials)
     forces = None if gel is None else Reconstructing(gel, limit.owner)
+    is_open = with_forces != without
     _SESSIONS[name] = DetectorSession(
-        detector, at_rest, area, moments, limit, kept, grip=grip, forces=forces, held_bytes=held
+        detector, at_rest, area, moments, limit, kept, is_open, grip=grip, forces=forces, held_bytes=held
     )
+    return None if is_open else without
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -96,6 +101,8 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         raise FitInProgress
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
+    if session.chooses_detector and session.begun is None:
+        _choose_detector(session, frame.force is not None)
     with_forces, force_report = _with_forces(session, frame, given)
     state, command = _detected(session, with_forces)
     if session.begun is None:
@@ -113,6 +120,13 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         return answer, None
     pressed = answer.get("command", {}).get("normal_force") if given.command is None else given.command
     return answer, pack_frame(given.number, state, with_forces.force, pressed, session.expected)
+
+
+def _choose_detector(session: DetectorSession, measures_force: bool) -> None:
+    """The one that suits the session's first frame, of which nothing is computed yet."""
+    method = method_with_displacement(session.position.shape[:2], measures_force)
+    if method != session.method:  # after a frame that was refused
+        session.detector = slipcore.SlipDetector(session.position, session.element_area, method)
 
 
 def _keep(session: DetectorSession, frame: Frame, given: PackedFrame, size: int) -> None:
@@ -237,6 +251,7 @@ def _answer(session: DetectorSession, number: int, state: SlipState) -> dict[str
     return {
         "type": "state",
         "number": number,
+        "detector": session.method,
         "time": state.time,
         "stick_ratio": None if math.isnan(state.stick_ratio) else float(state.stick_ratio),
         "macro_slip": bool(state.macro_slip),

@@ -44,14 +44,14 @@ class Control(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
-    """Begin: the sensor, its detector, whether the frames are to be kept for a log of a material, and whether a grip
-    controller is to answer them.
+    """Begin: the sensor, its detector (None: the one that suits), whether the frames are to be kept for a log of a
+    material, and whether a grip controller is to answer them.
     """
 
     position: Numbers
     grid: tuple[Number, Number]
     element_area: float
-    detector: str = "filter"
+    detector: str | None = None
     sensor: str = UNNAMED
     material: str | None = None
     keep: bool = False

@@ -73,8 +73,9 @@ class RecentAnswers:
 class Session:
     """What the server knows of a session; the detector is in the worker.
 
-    ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for; ``findings``: what its
-    client is to know of the sensor's gel; ``wanted``: another connection is to go on with it, ``free``: none does.
+    ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for; ``method`` of detection,
+    None until the first frame decides; ``findings``: what its client is to know of the sensor's gel; ``wanted``:
+    another connection is to go on with it, ``free``: none does.
     """
 
     id: str
@@ -82,6 +83,7 @@ class Session:
     key_id: str | None
     owner: str
     next: int = 0
+    method: str | None = None
     findings: list[dict[str, Any]] = field(default_factory=list)
     recent: RecentAnswers = field(default_factory=RecentAnswers)
     connected: bool = False
@@ -130,7 +132,7 @@ class Streams:
         position, opening.position = packed("position", opening.position), b""
         self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it
         try:
-            await self.ask(
+            session.method = await self.ask(
                 session, detectors.open_session, position, opening.grid, opening.element_area, opening.detector,
                 opening.keep, MemoryLimit(session.owner, self._most_bytes),
                 SessionOptions(opening.control, model, gel, materials),

@@ -109,6 +109,22 @@ def test_a_connection_that_breaks_again_at_once_is_told(opened: Any, monkeypatch
     assert len(made) == 2
 
 
+def test_the_detector_is_left_to_the_service_which_says_it(opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the first frame's answer at the latest; a service of before says none."""
+    live, made = opened([state(0), state(1) | {"detector": "coarse"}, BROKEN], [state(2)])
+    assert "detector" not in made[0].sent[0]
+    send(live, 3)
+    found = [live.detector]
+    for _ in range(3):
+        live.receive()
+        found.append(live.detector)
+    assert found == [None, None, "coarse", "coarse"]
+    monkeypatch.setattr(stream, "connect", lambda *_, **__: nullcontext(made[1]))
+    made[1]._answers = iter([OPENED | {"detector": "filter"}])
+    named = SlipStream("http://service/", np.zeros((2, 2, 3)), 1e-6, detector="filter")
+    assert (named.detector, made[1].sent[-1]["detector"]) == ("filter", "filter")
+
+
 def test_what_becomes_of_a_log_is_told_although_the_connection_broke(opened: Any) -> None:
     stored = {"type": "finished", "grasp_log": {"id": "7"}}
     live, made = opened([state(0), BROKEN], [stored])

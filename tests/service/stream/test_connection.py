@@ -28,6 +28,7 @@ from service.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream
 from slipcore import GraspLog, detect_slip
+from slipcore.contact import tangential_ramp
 from stiction_client import AnswerTimedOut, Contact, ControlSettings, FrictionClient, FrictionModel
 from stiction_client.errors import ConnectionFailed, InvalidArgument
 from stiction_client.stream import SlipStream
@@ -109,6 +110,27 @@ def test_the_streams_answers_are_the_batchs(served: Served, ramp: GraspLog, wait
         assert (log["format"], log["frames"], log["material"]) == ("stream", len(ramp), "streamed")
         assert wait(client, log["job"]["id"])["status"] == "done"
         assert client.get("/v1/materials/streamed").json()["models"]["ols"]["n"] > 0
+
+
+@pytest.mark.parametrize(
+    ("named", "taken"), [({}, "coarse"), ({"detector": None}, "coarse"), ({"detector": "filter"}, "filter")]
+)
+def test_few_elements_have_the_detector_that_suits_them_unless_one_is_named(
+    served: Served, wait: Any, named: dict[str, Any], taken: str
+) -> None:
+    """Also the log that is stored, and whoever comes back is told."""
+    few = tangential_ramp(points=4, pitch=3e-3)
+    with served.connect() as socket:
+        opened = ask(socket, opening(few, keep=True) | named)
+        assert opened["detector"] == named.get("detector")
+        assert ask(socket, frame(few, 0))["detector"] == taken
+    with served.connect() as socket:
+        assert ask(socket, {"type": "resume", "session": opened["session"], "last": 0})["detector"] == taken
+        ask(socket, frame(few, 1))
+        log = ask(socket, {"type": "finish", "store": True})["grasp_log"]
+    with httpx.Client(base_url=served.url) as client:
+        assert wait(client, log["job"]["id"])["status"] == "done"
+        assert client.get(f"/v1/grasp-logs/{log['id']}").json()["detection"]["method"] == taken
 
 
 def test_json_is_for_trials_and_a_wrong_frame_is_answered_by_name(served: Served, ramp: GraspLog) -> None:

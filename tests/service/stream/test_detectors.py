@@ -18,6 +18,7 @@ from service.processes.fair_executor import FairExecutor
 from service.stream import detector_session, detectors, friction_looks
 from service.stream.detector_session import STRIDE, WINDOW, PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.frames import UNNAMED
 from tests.service.report.test_material import MODEL
 
@@ -289,3 +290,72 @@ def test_a_stream_that_begins_in_touch_says_so(ramp: GraspLog, first: int, told:
     for k in (first, first + 1):
         answer, _ = detectors.step("one", whole_frame(ramp, k))
         assert [finding["evidence"] for finding in answer["findings"]] == told
+
+
+def few(shear: float = 1.0, hold: float = 0.0) -> GraspLog:
+    """A sphere on 4 × 4 elements, pressed by 6 N and pulled by 0.6 of friction."""
+    schedule = RampSchedule(rest=0.5, press=0.5, settle=0.3, shear=shear, hold=hold)
+    load = {"normal_force": 6.0, "tangential_force": 0.6, "frame_rate": 200.0}
+    noise = {"marker_noise": 5e-6, "force_noise": 1e-2, "seed": 3}
+    return tangential_ramp(points=4, pitch=3e-3, schedule=schedule, **load, **noise)
+
+
+def opened(log: GraspLog, method: str | None = None) -> str | None:
+    return detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, method, False, ROOM)
+
+
+def displacement_frame(log: GraspLog, k: int) -> PackedFrame:
+    return whole_frame(log, k)._replace(force=None)
+
+
+@pytest.mark.usefixtures("looks_at_once")
+def test_few_elements_with_forces_that_are_held_do_not_slip_where_no_detector_is_named() -> None:
+    """By ``filter`` all of them slip (tests/slipcore/test_method_choice.py)."""
+    held = few(hold=4.0)
+    history = detect_slip(held, "coarse")
+    assert opened(held) is None
+    for k in range(len(held)):
+        answer, _ = detectors.step("one", whole_frame(held, k))
+        assert answer["detector"] == "coarse"
+        assert answer["slip"] == np.flatnonzero(history.slip[k]).tolist()
+    assert answer["contact"] > 0
+    assert not history.slip[held.time > 2.5].any()
+
+
+@pytest.mark.parametrize(
+    ("method", "said", "with_forces", "without"),
+    [(None, None, "coarse", "filter"), ("filter", "filter", "filter", "filter"), ("coarse", "coarse", *["coarse"] * 2)],
+)
+@pytest.mark.usefixtures("sessions")
+def test_the_first_frame_that_is_taken_decides_on_a_detector_that_is_not_named(
+    method: str | None, said: str | None, with_forces: str, without: str
+) -> None:
+    log = few()
+    for make, expected in ((whole_frame, with_forces), (displacement_frame, without)):
+        assert opened(log, method) == said
+        other = whole_frame if make is displacement_frame else displacement_frame
+        with pytest.raises(InvalidInput, match="command"):
+            detectors.step("one", other(log, 0)._replace(command=-1.0))
+        with pytest.raises(InvalidInput, match="object_pose"):
+            detectors.step("one", other(log, 0)._replace(object_pose=[1e9, 0.0, 0.0]))  # after the choice
+        assert [detectors.step("one", make(log, k))[0]["detector"] for k in range(2)] == [expected] * 2
+        with pytest.raises(InvalidInput, match="force"):
+            detectors.step("one", other(log, 2))
+        detectors.drop("one")
+
+
+@pytest.mark.usefixtures("sessions")
+def test_many_elements_have_the_filter_from_the_start(ramp: GraspLog) -> None:
+    assert opened(ramp) == "filter"
+    assert detectors.step("one", whole_frame(ramp, 0))[0]["detector"] == "filter"
+
+
+@pytest.mark.usefixtures("sessions")
+def test_a_stream_without_a_detector_has_that_of_the_log_that_it_becomes(tmp_path: Path) -> None:
+    log = few()
+    for make in (whole_frame, displacement_frame):
+        detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, None, True, ROOM)
+        for k in range(2):
+            answer, _ = detectors.step("one", make(log, k))
+        assert detectors.write("one", tmp_path / "log.npz", "left").method == answer["detector"]
+        detectors.drop("one")
