@@ -52,6 +52,10 @@ NOTES = (
 )
 """Diagnostics that whoever reads an answer is to know beside it."""
 ONE_GRASP = "one grasp shows not by how much others differ, and this method does not allow for it: ask method auto"
+INDEPENDENT = (
+    "this method takes all samples for independent, so that its intervals are too narrow where grasps or places "
+    "differ: ask method auto"
+)
 SUPERSEDED = "a newer version took its place: fetch the current model"
 
 
@@ -92,7 +96,8 @@ class Model(Protocol):
         the newest of them differ from those before; ``unknown_velocity``: that the object's motion was not recorded;
         ``cluster_kind``: what of the samples shares errors, "grasp" where there are several, "merged" where these came
         as one set of moments; ``scale_between_grasps``:
-        by how much they are thought to differ, of methods that allow for it.
+        by how much they are thought to differ, of methods that allow for it; ``assumes``: that all errors are
+        independent, of methods that allow for nothing else.
         """
 
 
@@ -102,8 +107,8 @@ class Support:
 
     ``kind``, the first that applies: "implausible" (friction cannot be so, or findings speak against the logs),
     "stale" (the model is not the material's any more), "not identified" (the data do not show friction there, or no
-    coefficient at all, or are of one grasp by a method that takes the next one to be alike), "extrapolated" (beyond
-    the data), "supported".
+    coefficient at all, or are of one grasp by a method that takes the next one to be alike, or the method takes all
+    samples for independent), "extrapolated" (beyond the data), "supported".
     """
 
     kind: Kind
@@ -130,8 +135,9 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
     if not part <= UNCERTAIN or not any(model.identifiable.tolist()):
         return Support("not identified", _ignorance(part))
-    if _knows_no_scatter(model):
-        return Support("not identified", ONE_GRASP)
+    reason = _takes_grasps_as_alike(model)
+    if reason is not None:
+        return Support("not identified", reason)
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
     if outside is not None:
         return Support("extrapolated", f"{outside}: record a grasp there")
@@ -153,7 +159,7 @@ def kinds(
     if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
     identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
-    unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | _knows_no_scatter(model)
+    unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
     return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
@@ -251,10 +257,15 @@ def _knows_no_velocity(model: Model) -> bool:
     return "unknown_velocity" in model.diagnostics and not model.domain.tangential_velocity[1] > 0.0
 
 
-def _knows_no_scatter(model: Model) -> bool:
-    """Whether it is of one grasp, by a method that allows for no other friction in the next one."""
-    of_one = model.diagnostics.get("cluster_kind") in ("element", "time block", "none")
-    return of_one and "scale_between_grasps" not in model.diagnostics
+def _takes_grasps_as_alike(model: Model) -> str | None:
+    """Why its intervals do not hold for a new grasp, of a method that allows for no other friction in it: the samples
+    are of one, or it takes those of all grasps for independent. None of any other.
+    """
+    if "scale_between_grasps" in model.diagnostics:
+        return None
+    if model.diagnostics.get("cluster_kind") in ("element", "time block", "none"):
+        return ONE_GRASP
+    return INDEPENDENT if "assumes" in model.diagnostics else None
 
 
 def _inverse(bound: float) -> float:

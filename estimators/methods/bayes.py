@@ -85,6 +85,8 @@ def fit(
     diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
     if isinstance(posterior, HierarchicalPosterior):
         diagnostics |= pooled_prior(posterior.grid.nodes, scatter_prior) | sensor_gain(posterior.grid.nodes)
+    if name != "hierarchical":
+        diagnostics["assumes"] = "independent errors"
     independent = name != "hierarchical" and data.cluster_kind != "element"
     if independent and data.observations is not None:  # moments cannot show it
         diagnostics["shared_by_elements"] = shared_by_elements(data)

@@ -21,7 +21,7 @@ from stiction_client import (
     sdf_surface,
 )
 from stiction_client.defaults import BEND
-from stiction_client.support import ONE_GRASP, Support, disagreement, kinds, notes, support, uncertainty
+from stiction_client.support import INDEPENDENT, ONE_GRASP, Support, disagreement, kinds, notes, support, uncertainty
 
 Make = Callable[..., FrictionModel]
 
@@ -73,6 +73,18 @@ def test_one_grasp_has_support_only_where_the_next_one_may_differ(make_model: Ma
     several = replace(model, diagnostics={"cluster_kind": "grasp"})
     allowing = replace(model, diagnostics={"cluster_kind": kind, "scale_between_grasps": 0.1})
     assert several.support_at(0.0, 0.1).kind == allowing.support_at(0.0, 0.1).kind == "supported"
+
+
+@pytest.mark.parametrize("kind", ["grasp", "merged"])
+def test_who_takes_all_samples_for_independent_supports_no_answer(make_model: Make, kind: str) -> None:
+    told = {"cluster_kind": kind, "assumes": "independent errors"}
+    model = replace(make_model((0.4, 0.0, 0.0), EXACT), diagnostics=told)
+    assert model.support_at(0.0, 0.1) == Support("not identified", INDEPENDENT)
+    assert kinds(model, [0.0, 0.6], 0.1).tolist() == ["not identified"] * 2
+    assert required_normal_force(model, 0.3, of="element", contact_area=6e-5).support == "not identified"
+    with pytest.raises(ValueError, match="independent"):
+        mujoco_geom(model, 0.1)
+    assert mujoco_geom(model, 0.1, allow_unidentified=True)
 
 
 def test_a_model_tells_what_it_rests_on_in_the_middle_of_its_data(make_model: Make) -> None:

@@ -97,3 +97,13 @@ def test_a_slope_that_the_prior_pulls_is_not_called_known(samples: Make) -> None
     assert model.diagnostics["prior_sensitivity_beta1"] > 1.0
     assert not model.identifiable[1]
     np.testing.assert_allclose(estimators.fit(data).coefficients[1], 2.6e4, rtol=0.01)  # least squares has no prior
+
+
+@pytest.mark.parametrize("how", [{"method": "conjugate"}, {"method": "bayes", "likelihood": "gaussian"}])
+def test_who_takes_grasps_for_independent_samples_does_not_identify_friction(
+    samples: Make, how: dict[str, str]
+) -> None:
+    grasps = [samples(60, seed=g) for g in range(6)]
+    found, other = estimators.fit(grasps, **how), estimators.fit(grasps, method="ols")
+    assert found.identifiable.all()
+    assert (found.support, other.support) == ("not identified", "supported")
