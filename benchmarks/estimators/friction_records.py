@@ -67,7 +67,8 @@ def table(name: str, data: FrictionSamples, methods: tuple[str, ...]) -> dict[st
         told = model.diagnostics
         known = ", ".join("yes" if flag else "no" for flag in model.identifiable)
         slope = f"{model.coefficients[1]:.4g} ± {0.5 * float(np.diff(model.interval()[1])[0]):.2g}"
-        pull = f"a prior twice as wide moves β₁ by {told['prior_sensitivity_beta1']:.2g} sd" if "prior" in told else ""
+        moved = told.get("prior_sensitivity_beta1")
+        pull = "" if moved is None else f"a prior twice as wide moves β₁ by {moved:.2g} sd"
         remark = told.get("chosen_because", pull)
         level = float(model.predict(np.median(v), np.median(f_n)))
         print(f"| {method} | {level:.4f} | {slope} | {model.scale:.4f} | {known} | {remark} |")
@@ -88,7 +89,7 @@ def picture(name: str, data: FrictionSamples, model: estimators.FrictionModel, p
     over_velocity.plot(v * 1e6, data.friction_coefficient[shown], ".", markersize=1, color="0.5", label="samples")
     over_velocity.plot(across * 1e6, model.predict(across, middle), "C0-", label="fitted mean")
     low, high = model.predict(across, middle, 0.05), model.predict(across, middle, 0.95)
-    over_velocity.fill_between(across * 1e6, low, high, alpha=0.25, label="5 to 95 % of new samples")
+    over_velocity.fill_between(across * 1e6, low, high, alpha=0.25, label="5 to 95 % in a new record")
     over_velocity.set_xlabel("velocity, µm/s")
     over_velocity.legend(loc="best", markerscale=6)
     figure.suptitle(f"{name}: {model.method}")

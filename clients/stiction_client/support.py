@@ -51,7 +51,7 @@ NOTES = (
     UNNOTICED,
 )
 """Diagnostics that whoever reads an answer is to know beside it."""
-ONE_GRASP = "one grasp shows not by how much others differ, and this method does not allow for it: ask method auto"
+ONE_GRASP = "one grasp does not show by how much others differ, and this method has no scale of it: ask method auto"
 INDEPENDENT = (
     "this method takes all samples for independent, so that its intervals are too narrow where grasps or places "
     "differ: ask method auto"

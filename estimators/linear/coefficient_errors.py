@@ -10,6 +10,7 @@ from estimators.defaults import IDENTIFIABILITY
 from estimators.linear.cluster_errors import cluster_robust, satterthwaite
 from estimators.linear.least_squares import LinearFit
 from estimators.linear.orthonormal import in_coefficients
+from estimators.linear.priors import WEAK
 
 FloatArray = NDArray[np.float64]
 
@@ -43,3 +44,16 @@ def clustered_errors(
     ratio = special.stdtrit(degrees, IDENTIFIABILITY.ends[1]) / special.stdtrit(freedom, IDENTIFIABILITY.ends[1])
     scaled = linear.prior_covariance + np.outer(ratio, ratio) * (root @ covariance @ root.T)
     return CoefficientErrors(scaled, freedom, degrees, np.sqrt(np.diag(in_coefficients(linear, covariance))))
+
+
+def of_any_grasp(errors: CoefficientErrors, coefficients: NDArray[np.floating]) -> CoefficientErrors:
+    """The errors of a law that one grasp alone shows, as it holds of grasps on average.
+
+    A grasp's friction is 1 + u times that law, and only others show how large u may be: it is as the weak prior of the
+    scatter between grasps expects, and its 95 % interval adds to that of each coefficient as root of squares. The
+    ``standard`` errors stay those within the grasp.
+    """
+    upper = IDENTIFIABILITY.ends[1]
+    part = WEAK.effect_quantile(upper) / float(special.stdtrit(errors.degrees_of_freedom, upper))
+    along = part * np.asarray(coefficients, dtype=float)
+    return errors._replace(covariance=errors.covariance + np.outer(along, along))

@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from estimators.defaults import PRIOR, REFERENCE, Prior
+from estimators.defaults import POPULATION, PRIOR, REFERENCE, Prior
 from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
+from estimators.linear.normal_mixture import mixture_quantile
 
 FloatArray = NDArray[np.float64]
 
@@ -44,6 +46,13 @@ class ScatterPrior:
     def log_density(self, tau: FloatArray) -> FloatArray:
         """Of τ, up to a constant."""
         return log_half_student(tau, self.scale, self.degrees_of_freedom)
+
+    def effect_quantile(self, level: float) -> float:
+        """Quantile of u ~ N(0, τ²), by which part a grasp differs from the others: over quantiles of τ."""
+        part = (np.arange(POPULATION.quantiles) + 0.5) / POPULATION.quantiles
+        tau = np.asarray(self.scale * special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + part)), dtype=float)
+        weight = np.full(len(tau), 1.0 / len(tau))
+        return float(mixture_quantile(weight, np.zeros(len(tau)), tau, level)[0])
 
 
 WEAK = ScatterPrior()

@@ -10,11 +10,12 @@ from estimators.defaults import LINEAR, REFERENCE
 from estimators.friction_model import FrictionModel
 from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.cluster_errors import cluster_sums
-from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
+from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors, of_any_grasp
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.observations import IntArray
 from estimators.linear.orthonormal import in_coefficients, orthonormal, orthonormal_blocks
+from estimators.linear.priors import WEAK
 from estimators.methods.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
@@ -33,11 +34,14 @@ def fit(data: FitData) -> FrictionModel:
     residual_degrees = data.effective_n - 1.0 - linear.rank
     scale = float(linear.residual_norm / np.sqrt(residual_degrees))
     errors = _errors(data, linear, scale, residual_degrees)
-    diagnostics = {
+    diagnostics: Diagnostics = {
         "r_squared": r_squared(data.factor.triangle, linear.residual_norm),
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
         **_of_clusters(data, linear, errors),
     }
+    if data.of_one_grasp:
+        errors = of_any_grasp(errors, linear.coefficients)
+        diagnostics |= {"prior": f"between grasps {WEAK}"}
     found = PosteriorSummary(linear.coefficients, errors.covariance, scale, errors.degrees_of_freedom, residual_degrees)
     return report(data, "ols", found, begin, diagnostics, linear)
 

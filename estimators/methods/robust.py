@@ -6,8 +6,10 @@ from estimators.defaults import ROBUST
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.likelihoods.posterior import PosteriorSummary
+from estimators.linear.coefficient_errors import of_any_grasp
 from estimators.linear.fit_data import FitData
 from estimators.linear.m_estimate import LOSSES, m_estimate
+from estimators.linear.priors import WEAK
 from estimators.methods.reporting import Diagnostics, by_coefficient, report
 from estimators.not_converged import NotConverged
 
@@ -29,6 +31,9 @@ def fit(data: FitData, loss: str = "tukey", seed: int = 0) -> FrictionModel:
         **by_coefficient("standard_error_cluster", errors.standard),
         **by_coefficient("degrees_of_freedom", errors.degrees),
     }
+    if data.of_one_grasp:
+        errors = of_any_grasp(errors, coefficients)
+        diagnostics |= {"prior": f"between grasps {WEAK}"}
     summary = PosteriorSummary(coefficients, errors.covariance, found.scale, errors.degrees_of_freedom, degrees)
     model = report(data, "robust", summary, begin, diagnostics)
     if not found.settled:

@@ -44,6 +44,12 @@ def samples() -> Callable[..., FrictionSamples]:
 
 
 @pytest.fixture
+def places_as_grasps() -> Callable[[FrictionSamples], list[FrictionSamples]]:
+    """The samples of each element as a grasp of its own, for what is about clusters and not about how grasps differ."""
+    return lambda data: [data.take(data.element == place) for place in np.unique(data.element)]
+
+
+@pytest.fixture
 def truth() -> np.ndarray:
     return TRUTH
 

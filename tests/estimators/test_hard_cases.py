@@ -172,10 +172,13 @@ def test_constant_normal_force_leaves_its_slope_open(samples: Make) -> None:
 
 
 @pytest.mark.parametrize("jitter", [0.0, 1e-15, 1e-12])
-def test_collinear_velocity_and_force_flag_both_slopes_and_predict_on_the_line(samples: Make, jitter: float) -> None:
+def test_collinear_velocity_and_force_flag_both_slopes_and_predict_on_the_line(
+    samples: Make, places_as_grasps: Callable[[FrictionSamples], list[FrictionSamples]], jitter: float
+) -> None:
     v = np.linspace(1e-3, 5e-3, 300)
     f_n = 20.0 * v * (1.0 + jitter * np.random.default_rng(0).standard_normal(300))
-    model = estimators.fit(samples(300, tangential_velocity=v, normal_force=f_n))
+    data = samples(300, tangential_velocity=v, normal_force=f_n)
+    model = estimators.fit(places_as_grasps(data))
     np.testing.assert_array_equal(model.identifiable, [True, False, False])
     assert model.diagnostics["rank"] == 2.0
     on_line = model.predict(v, f_n)

@@ -9,11 +9,13 @@ from scipy import stats
 from statsmodels.regression.linear_model import OLS, WLS
 
 import estimators
+from estimators import ScatterPrior
 from estimators.defaults import LINEAR, REFERENCE
 from estimators.methods import ols
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
+Cut = Callable[[FrictionSamples], list[FrictionSamples]]
 
 
 def design(samples: FrictionSamples) -> np.ndarray:
@@ -67,9 +69,11 @@ def dense_cr2(x: np.ndarray, residual: np.ndarray, cluster: np.ndarray) -> tuple
 
 
 @pytest.mark.parametrize("elements", [9, 30])
-def test_cluster_errors_and_their_degrees_of_freedom_are_those_of_cr2(samples: Make, elements: int) -> None:
+def test_cluster_errors_and_their_degrees_of_freedom_are_those_of_cr2(
+    samples: Make, places_as_grasps: Cut, elements: int
+) -> None:
     data = samples(200, elements=elements)
-    model = estimators.fit(data)
+    model = estimators.fit(places_as_grasps(data))
     x = design(data) * [1.0, 1e3, 10.0]  # well scaled, as the dense formula needs it
     residual = data.friction_coefficient - design(data) @ model.coefficients
     wanted, degrees = dense_cr2(x, residual, data.element)
@@ -79,6 +83,25 @@ def test_cluster_errors_and_their_degrees_of_freedom_are_those_of_cr2(samples: M
     assert (found < elements - 1).all()
     half = stats.t(degrees).ppf(0.975) * wanted * [1.0, 1e3, 10.0]
     np.testing.assert_allclose(model.interval()[:, 1] - model.coefficients, half, rtol=1e-6)
+    alone = estimators.fit(data)  # as places of one grasp
+    np.testing.assert_allclose(standard_errors(alone, "cluster"), standard_errors(model, "cluster"), rtol=1e-9)
+    of_others = ScatterPrior().effect_quantile(0.975) * alone.coefficients
+    np.testing.assert_allclose(alone.interval()[:, 1] - alone.coefficients, np.hypot(half, of_others), rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["ols", "robust"])
+def test_intervals_of_one_grasp_hold_the_law_of_all(samples: Make, truth: np.ndarray, method: str) -> None:
+    """Of grasps that differ by 7 %, as the prior has it. Errors within the grasp alone hold friction in one of four."""
+    fits, inside, within = 150, np.zeros(3), np.zeros(3)
+    rng = np.random.default_rng(8)
+    for seed in range(fits):
+        own = truth * (1.0 + 0.07 * rng.standard_normal())
+        model = estimators.fit(samples(200, seed=seed, coefficients=own), method=method)
+        low, high = model.interval().T
+        inside += (low <= truth) & (truth <= high)
+        within += np.abs(model.coefficients - truth) < 1.96 * standard_errors(model, "cluster")
+    assert (inside >= stats.binom(fits, 0.95).ppf(1e-3)).all()
+    assert within[0] < 0.5 * fits
 
 
 def test_degrees_of_freedom_fall_where_one_cluster_tells_most(samples: Make) -> None:
@@ -90,12 +113,12 @@ def test_degrees_of_freedom_fall_where_one_cluster_tells_most(samples: Make) -> 
 
 @pytest.mark.parametrize("fits", [150, pytest.param(400, marks=pytest.mark.long)])
 def test_intervals_cover_the_truth_and_predictions_a_new_observation(
-    samples: Make, truth: np.ndarray, fits: int
+    samples: Make, places_as_grasps: Cut, truth: np.ndarray, fits: int
 ) -> None:
     level = 0.9
     inside, predicted = np.zeros(3), 0
     for seed in range(fits):
-        model = estimators.fit(samples(200, seed=seed, elements=40))
+        model = estimators.fit(places_as_grasps(samples(200, seed=seed, elements=40)))
         low, high = model.interval(level).T
         inside += (low <= truth) & (truth <= high)
         new = samples(1, seed=10_000 + seed)
@@ -142,9 +165,11 @@ def test_four_samples_leave_one_degree_of_freedom(samples: Make) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, 2e-3, 0.1 + 0.2])
-def test_constant_velocity_leaves_its_slope_open_and_prediction_valid(samples: Make, speed: float) -> None:
+def test_constant_velocity_leaves_its_slope_open_and_prediction_valid(
+    samples: Make, places_as_grasps: Cut, speed: float
+) -> None:
     data = samples(300, tangential_velocity=np.full(300, speed))
-    model = estimators.fit(data)
+    model = estimators.fit(places_as_grasps(data))
     assert not model.identifiable[1]
     assert model.identifiable[2]
     assert model.identifiable[0] == (speed == 0.0)  # away from v = 0, the unknown slope carries β₀ with it
@@ -173,13 +198,16 @@ def test_a_collinear_pair_splits_the_slope_by_the_prior() -> None:
     np.testing.assert_allclose(fit.prior_covariance[1:, 1:], np.outer(null, null) / (null**2 @ spans**2), rtol=1e-12)
 
 
-def test_noise_that_grows_as_the_inverse_force_is_covered(samples: Make, truth: np.ndarray) -> None:
+def test_noise_that_grows_as_the_inverse_force_is_covered(
+    samples: Make, places_as_grasps: Cut, truth: np.ndarray
+) -> None:
     fits, inside, classical = 300, np.zeros(3), np.zeros(3)
     for seed in range(fits):
         rng = np.random.default_rng([seed, 1])
         f_n = rng.uniform(0.01, 0.1, 300)
         noise = 0.02 / f_n * rng.standard_normal(300)
-        model = estimators.fit(samples(300, seed=seed, normal_force=f_n, elements=60, noise=noise))
+        data = samples(300, seed=seed, normal_force=f_n, elements=60, noise=noise)
+        model = estimators.fit(places_as_grasps(data))
         low, high = model.interval(0.9).T
         inside += (low <= truth) & (truth <= high)
         classical += np.abs(model.coefficients - truth) < 1.65 * standard_errors(model, "classical")
@@ -188,11 +216,12 @@ def test_noise_that_grows_as_the_inverse_force_is_covered(samples: Make, truth: 
     assert classical[2] < expected.ppf(1e-3)  # the classical errors do fail here
 
 
-def test_narrow_range_of_velocity_is_not_identifiable_and_a_wide_one_is(samples: Make) -> None:
+def test_narrow_range_of_velocity_is_not_identifiable_and_a_wide_one_is(samples: Make, places_as_grasps: Cut) -> None:
     rng = np.random.default_rng(0)
     sliver = estimators.fit(samples(300, tangential_velocity=rng.uniform(1e-3, 1.02e-3, 300)))
     assert not sliver.identifiable[1]
-    assert estimators.fit(samples(300)).identifiable.all()
+    assert estimators.fit(places_as_grasps(samples(300))).identifiable.all()
+    assert estimators.fit(samples(300)).identifiable.tolist() == [False, True, True]  # others may differ from one grasp
 
 
 def test_large_samples_leave_statsmodels_out(samples: Make, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from estimators.linear import m_estimate
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
+Cut = Callable[[FrictionSamples], list[FrictionSamples]]
 
 
 def spoiled(samples: Make, fraction: float, n: int = 300, seed: int = 0) -> FrictionSamples:
@@ -61,11 +62,11 @@ def test_on_clean_data_it_costs_a_twentieth_in_variance(samples: Make, fits: int
 
 @pytest.mark.parametrize("fits", [60, pytest.param(150, marks=pytest.mark.long)])
 def test_intervals_cover_with_a_tenth_of_outliers_and_plain_ones_do_not(
-    samples: Make, truth: np.ndarray, fits: int
+    samples: Make, places_as_grasps: Cut, truth: np.ndarray, fits: int
 ) -> None:
     inside, plain = np.zeros(3), np.zeros(3)
     for seed in range(fits):
-        data = spoiled(samples, 0.1, seed=seed)
+        data = places_as_grasps(spoiled(samples, 0.1, seed=seed))
         for method, count in (("robust", inside), ("ols", plain)):
             low, high = estimators.fit(data, method=method).interval(0.9).T
             count += (low <= truth) & (truth <= high)
