@@ -10,5 +10,8 @@ FitMethod = Literal[ModelMethod, "auto"]
 
 METHODS: tuple[FitMethod, ...] = get_args(FitMethod)
 
+PLANNING_METHODS = tuple(method for method in METHODS if method != "conjugate")
+"""Those whose models a planner is offered: "conjugate" takes all samples for independent."""
+
 SCATTER_METHODS = ("hierarchical", "bayes", "auto")
 """Those whose model has the scatter between grasps, of which there is a prior."""

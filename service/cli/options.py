@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from estimators.method_names import METHODS
+from estimators.method_names import METHODS, PLANNING_METHODS
 
 Log = Annotated[
     Path,
@@ -51,7 +51,10 @@ Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="A
 Limit = Annotated[int, typer.Option("--limit", min=1, help="So many at most.")]
 MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[
-    str, typer.Option("--method", help=f"Whose current model: {', '.join(METHODS[:-1])}, or auto: the recommended one.")
+    str,
+    typer.Option(
+        "--method", help=f"Whose current model: {', '.join(PLANNING_METHODS[:-1])}, or auto: the recommended one."
+    ),
 ]
 GraspingSensor = Annotated[
     str | None, typer.Option("--sensor", help="That grasps: friction as it shows it, where the model knows its gain.")

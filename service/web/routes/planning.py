@@ -4,7 +4,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from estimators.method_names import METHODS
+from estimators.method_names import PLANNING_METHODS
 from service.domain.planning import plan
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
@@ -24,7 +24,7 @@ FIELDS = frozenset(NewGraspForce.model_fields)
 def show_plan(context: CurrentContext, request: Request) -> Response:
     """The form, what it was last asked, and forces for other probabilities of slip; raises as the API's route does."""
     fields = {name: text for name, text in request.query_params.items() if name in FIELDS}
-    given: dict[str, Any] = {"fields": fields, "names": names(context), "methods": METHODS}
+    given: dict[str, Any] = {"fields": fields, "names": names(context), "methods": PLANNING_METHODS}
     given |= {"answer": None, "chart": None}
     on_problem(request, "plan.html", **given)
     if not fields.get("tangential_load"):
