@@ -10,8 +10,8 @@ Counted: loads answered by one, two and three logs; how often a new grasp slips 
 five, over what was asked; answers that vanish with the second log, with the third to fifth, and with the sixth to
 twentieth; steps in which any of a material's loads loses its answer. Writes answers_kept.json.
 
-`--shapes`: instead, both factors in the model, in worlds of either: what it costs to take one for the other. Writes
-answers_of_shapes.json.
+`--shapes`: instead, both factors and one between them in the model, in worlds of either: what it costs to take one for
+the other. Writes answers_of_shapes.json.
 """
 
 import os
@@ -65,8 +65,13 @@ COLUMNS = (
     "of all, %",
     "steps with one, %",
 )
-SHAPES: tuple[tuple[str, float | None], ...] = (("normal", None), ("log-normal", WIDER))
-"""Factors of the model, and the scale of its prior where it is not the default."""
+SHAPES: tuple[tuple[str, float, float | None], ...] = (
+    ("normal", 1.0, None),
+    ("cube of a normal one", 3.0, WIDER),
+    ("log-normal", np.inf, WIDER),
+)
+"""Factors of the model, of which power of a normal one each is, and the scale of its prior where it is not the
+default."""
 GROWN = (1, 2, 3, 5, 10, 20)
 SHAPE_COLUMNS = (
     "factor of the world",
@@ -91,27 +96,31 @@ class LogNormalScatter(ScatterPrior):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositiveFactor(FrictionModel):
-    """A model that takes what a grasp scales friction by for log-normal, of mean 1, and its ``common`` error too: as
-    much of the coefficients' covariance as scales the whole law, which is then no more in it. For small quantiles.
+    """A model that takes what a grasp scales friction by for a ``power`` of a normal one (infinite: log-normal; the
+    third is nearly gamma: Wilson & Hilferty, 1931, PNAS 17:684), of mean 1, and its ``common`` error too: as much of
+    the coefficients' covariance as scales the whole law, which is then no more in it. For small quantiles.
     """
 
     common: float = 0.0
+    power: float = np.inf
 
     @classmethod
-    def of(cls, model: FrictionModel) -> "PositiveFactor":
+    def of(cls, model: FrictionModel, power: float = np.inf) -> "PositiveFactor":
         """The same fit."""
         told = {entry.name: getattr(model, entry.name) for entry in fields(FrictionModel)}
         law = model.coefficients
         part = 1.0 / float(law @ np.linalg.solve(model.covariance, law))
         told["covariance"] = model.covariance - part * np.outer(law, law)
-        return cls(**told, common=float(np.sqrt(part)))
+        return cls(**told, common=float(np.sqrt(part)), power=power)
 
     def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
-        """The factor's quantile is the exponential of that of a normal one."""
+        """The factor's quantile is the power, or the exponential, of that of a normal one."""
         shared, own = FrictionModel.scatter(self, quantile, elements)
         known = special.stdtrit(self.degrees_of_freedom, quantile) * self.common
         spread = 0.0 if self.scales is None else np.log1p(self.scales.between_grasps.value**2)
-        return float(-np.expm1(-np.hypot(shared, known) - 0.5 * spread)), own
+        away = float(np.hypot(shared, known))
+        power = np.exp(-away) if np.isinf(self.power) else max(1.0 - away / self.power, 0.0) ** self.power
+        return float(1.0 - power * np.exp(-0.5 * spread * (1.0 - 1.0 / self.power))), own
 
 
 class Followed(NamedTuple):
@@ -188,9 +197,9 @@ def of_shapes(seed: int, median: float, *, normal: bool) -> list[tuple[NDArray[n
     kind, logs, least = material(seed, median, COUNT, normal=normal)
     loads = {asked: np.array([load_of(kind, float(force), asked) for force in least]) for asked in ASKED}
     found = []
-    for factor, scale in SHAPES:
+    for _, power, scale in SHAPES:
         models = growing(logs, ScatterPrior() if scale is None else ScatterPrior(scale=scale))
-        models = models if factor == "normal" else [*map(PositiveFactor.of, models)]
+        models = models if power == 1.0 else [PositiveFactor.of(each, power) for each in models]
         forces = {asked: told(models, each, asked) for asked, each in loads.items()}
         slipped = [[_mean_slip(kind, loads[asked], forces[asked][k - 1], asked) for k in GROWN] for asked in ASKED]
         found.append((np.isfinite(forces[ASKED[0]]), np.array(slipped)))
@@ -209,7 +218,7 @@ def shape_rows(seeds: Sequence[int]) -> list[list[object]]:
     rows = list[list[object]]()
     for normal in (False, True):
         cases = [of_shapes(seed, median, normal=normal) for median in MEDIANS for seed in seeds]
-        for (factor, scale), found in zip(SHAPES, zip(*cases, strict=True), strict=True):
+        for (factor, _, scale), found in zip(SHAPES, zip(*cases, strict=True), strict=True):
             answered, slipped = np.stack([each[0] for each in found]), np.nanmean([each[1] for each in found], axis=0)
             lost = answered[:, :-1] & ~answered[:, 1:]
             rows.append(
@@ -233,7 +242,7 @@ def main() -> None:
     parser = options(__doc__)
     parser.add_argument("--materials", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--shapes", action="store_true", help="both factors, in worlds of either")
+    parser.add_argument("--shapes", action="store_true", help="other factors, in worlds of either")
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     seeds = range(arguments.seed, arguments.seed + arguments.materials)

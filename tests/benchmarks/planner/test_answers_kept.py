@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import lognorm
+from scipy.stats import gamma, lognorm
 
 from benchmarks.estimators.population import scatters
 from benchmarks.estimators.scatter import CONTACT, grasp
@@ -53,6 +53,13 @@ def test_of_a_known_scale_a_log_normal_factor_has_its_quantile(model: FrictionMo
     assert 1.0 - shared == pytest.approx(lognorm(spread, scale=np.exp(-0.5 * spread**2)).ppf(0.01), abs=1e-3)
 
 
+def test_of_a_known_scale_the_cube_of_a_normal_factor_is_nearly_gamma(model: FrictionModel) -> None:
+    assert model.scales is not None
+    scales = replace(model.scales, between_grasps=Scale(0.1, 1e9))
+    shared, _ = replace(PositiveFactor.of(model, 3.0), common=0.0, scales=scales).scatter(0.01, CONTACT)
+    assert 1.0 - shared == pytest.approx(gamma(100.0, scale=0.01).ppf(0.01), abs=2e-3)
+
+
 def test_a_log_normal_factor_leaves_the_fit_as_it_was(model: FrictionModel) -> None:
     factor = PositiveFactor.of(model)
     law = factor.coefficients
@@ -77,8 +84,9 @@ def test_a_line_counts_answers_and_those_that_vanish() -> None:
 
 
 def test_in_a_normal_world_a_log_normal_factor_lets_more_slip() -> None:
-    normal, log_normal = of_shapes(8000, 0.12, normal=True)
+    normal, between, log_normal = of_shapes(8000, 0.12, normal=True)
     assert normal[0].shape == log_normal[0].shape == (20, 20)
     assert normal[1].shape == log_normal[1].shape == (len(ASKED), len(GROWN))
-    assert (log_normal[1][:, -1] > normal[1][:, -1]).all()
-    assert len(SHAPES) == 2
+    assert (log_normal[1][:, -1] > between[1][:, -1]).all()
+    assert (between[1][:, -1] > normal[1][:, -1]).all()
+    assert len(SHAPES) == 3
