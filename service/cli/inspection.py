@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison, Reconstruction
 
+COMPARED_FRAMES = 20
+"""Evenly spaced: ratios need no more, and markers in the plane can take seconds to show a frame's contact."""
+
 
 @dataclass(frozen=True, slots=True)
 class InspectedLog:
@@ -60,19 +63,27 @@ def inspect_log(
 
 
 def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
-    """How the log's own forces agree with those by the gel alone, where there are both; raises ``InvalidInput`` for a
-    log of forces alone.
+    """How the log's own forces agree with those by the gel alone, where there are both, in ``COMPARED_FRAMES`` of those
+    in which something touches; raises ``InvalidInput`` for a log of forces alone.
     """
     if gel is None or log.force is None:
         return None
+    import numpy as np
+
     from slipcore import InvalidInput
     from slipcore.forces import Gel, compare_forces, reconstruct
+    from slipcore.forces.recording import DisplacementData
 
     if not log.has_displacement:
         raise InvalidInput("gel", "given for a log of forces alone", "a log with displacement")
     by_gel = replace(log, gripper_force=None, gripper_force_deviation=None)  # which would hide what is wrong of the gel
+    described = Gel.from_json(_read_json(gel, "gel"))
     with shown_progress("reconstructing forces"):
-        return compare_forces(log, reconstruct(by_gel, Gel.from_json(_read_json(gel, "gel"))))
+        shown = DisplacementData.of(by_gel, None)
+        touched = np.flatnonzero(shown.touched())
+        spaced = np.linspace(0, len(touched), COMPARED_FRAMES, endpoint=False, dtype=int)
+        frames = np.union1d(touched[spaced] if len(touched) else touched, (0, len(log) - 1))
+        return compare_forces(log.take(frames), reconstruct(by_gel.take(frames), described, noise=shown.noise))
 
 
 def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tuple[GraspLog, dict[str, float]]":

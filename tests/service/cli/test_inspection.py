@@ -1,12 +1,16 @@
 """Whether a log's own forces are compared with those by its gel."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from service.cli.inspection import comparison
+from service.cli.inspection import COMPARED_FRAMES, comparison
 from slipcore import GraspLog, InvalidInput
+from slipcore.contact.tiers.ramp import tangential_ramp
+from slipcore.forces import Gel, compare_forces, reconstruct
 
 PLACE = 1e-3 * np.stack(np.meshgrid(np.arange(3.0), np.arange(3.0), [0.0], indexing="ij"), axis=-1)[:, :, 0]
 STILL = np.zeros((2, 3, 3, 3))
@@ -21,3 +25,21 @@ def test_forces_are_compared_where_there_are_both(tmp_path: Path) -> None:
     alone = GraspLog(np.arange(2.0), PLACE, STILL, 1e-6, force=STILL, metadata={"displacement": "none"})
     with pytest.raises(InvalidInput, match="gel is given for a log of forces alone; allowed: a log with displacement"):
         comparison(alone, gel)
+
+
+def test_some_frames_of_a_log_compare_as_all_of_them_do(tmp_path: Path) -> None:
+    """Its noise is that from each frame to the next, not to one a tenth of a second later."""
+    log = tangential_ramp(points=6, pitch=2e-3, marker_noise=1e-6, seed=1)
+    assert len(log) > 5 * COMPARED_FRAMES
+    gel = Gel(young_modulus=1e5, poisson_ratio=0.4)
+    path = tmp_path / "gel.json"
+    path.write_text(json.dumps(gel.to_json()), encoding="utf-8")
+    some, whole = comparison(log, path), compare_forces(log, reconstruct(log, gel))
+    assert some is not None
+    for name in ("normal", "tangential", "total_normal", "total_tangential"):
+        np.testing.assert_allclose(getattr(some, name).ratio, getattr(whole, name).ratio, rtol=0.03)
+        np.testing.assert_allclose(getattr(some, name).correlation, getattr(whole, name).correlation, atol=0.02)
+    still = replace(log, displacement=np.zeros_like(log.displacement))
+    nothing = comparison(still, path)
+    assert nothing is not None
+    assert np.isnan(nothing.total_normal.ratio)
