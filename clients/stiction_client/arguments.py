@@ -35,6 +35,12 @@ def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
     return int(number)
 
 
+def of_kind(name: str, value: object, kind: type) -> None:
+    """Raises ``InvalidArgument`` for a value that is no ``kind``."""
+    if not isinstance(value, kind):
+        raise InvalidArgument(name, shown(value), f"an object of {kind.__name__}")
+
+
 def number_of_items(limit: object) -> float:
     """How many items a ``limit`` allows, any number where it is None; raises ``InvalidArgument`` for another value."""
     if limit is None:

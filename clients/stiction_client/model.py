@@ -69,8 +69,16 @@ class FrictionModel(LinearFriction):
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
         """The model in the service's answer; degrees of freedom of null mean a normal distribution.
 
-        Raises ``ValueError`` for what no fit gives: text or ``true`` for a number, a negative variance.
+        Raises ``ValueError`` for what no fit gives: text or ``true`` for a number, a negative variance, a part missing.
         """
+        try:
+            return cls._read(record)
+        except (KeyError, TypeError, AttributeError) as error:
+            shown = f"one that lacks or garbles {error}"
+            raise InvalidArgument("record", shown, "what to_json and the service give of a model") from error
+
+    @classmethod
+    def _read(cls, record: Mapping[str, Any]) -> "FrictionModel":
         domain, cost = record["domain"], record["cost"]
         identifiable = [json_values.truth("identifiable", each) for each in record["identifiable"]]
         return cls(
@@ -140,7 +148,7 @@ class FrictionModel(LinearFriction):
             allowed = f"{FILE_FORMAT} of version {FILE_VERSION}; save it anew, or upgrade stiction-client"
             raise InvalidArgument("file", f"{path}, of {kind} version {version}", allowed)
         try:
-            return cls.from_json(record["model"])
+            return cls._read(record["model"])
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidArgument("file", path, f"a whole model (it lacks or garbles {error})") from error
 

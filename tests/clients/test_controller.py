@@ -443,6 +443,12 @@ def test_a_step_changes_nothing_that_it_was_given() -> None:
         ({"torque": math.nan}, "torque"),
         ({"stick_ratio": 1.1}, "stick_ratio"),
         ({"stick_ratio": -0.1}, "stick_ratio"),
+        ({"time": "1.1"}, "time"),
+        ({"normal": None}, "normal"),
+        ({"tangential": True}, "tangential"),
+        ({"torque": np.zeros(2)}, "torque"),
+        ({"slip_samples": [(0.5, 1.0)]}, "slip_samples"),
+        ({"slip_samples": SlipSamples([0.5], np.ones(1))}, "slip_samples.friction_coefficient"),  # type: ignore[arg-type]
         ({"slip_samples": SlipSamples(np.ones(2), np.ones(3))}, "slip_samples.normal_force"),
         ({"slip_samples": SlipSamples(np.array([math.nan]), np.ones(1))}, "slip_samples.friction_coefficient"),
         ({"slip_samples": SlipSamples(np.ones(1), np.array([-1.0]))}, "slip_samples.normal_force"),
@@ -454,6 +460,26 @@ def test_an_observation_that_cannot_be_is_refused_by_name(wrong: dict[str, Any],
         GraspController.step(state, dataclasses.replace(Observation(1.1, 1.0, 0.1, 0.0, 0.9), **wrong))
     assert refusal.value.name == name
     GraspController.step(state, Observation(1.1, 1.0, 0.1, 0.0, 0.9))
+
+
+def test_what_is_no_observation_at_all_is_refused() -> None:
+    with pytest.raises(InvalidArgument, match="observation is None; allowed: an object of Observation"):
+        GraspController.step(GraspController.init(SETTINGS), None)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        (("settings.toml",), "settings"),
+        ((SETTINGS, "wood"), "model"),
+        ((SETTINGS, None, ["wood"]), "materials"),
+        ((SETTINGS, None, {"wood": 0.5}), "materials['wood']"),
+    ],
+)
+def test_what_are_no_settings_and_no_models_are_refused_by_name(wrong: tuple[Any, ...], name: str) -> None:
+    with pytest.raises(InvalidArgument) as refusal:
+        GraspController.init(*wrong)
+    assert refusal.value.name == name
 
 
 def test_torque_on_a_contact_without_an_arm_is_refused() -> None:
@@ -470,6 +496,7 @@ def test_torque_on_a_contact_without_an_arm_is_refused() -> None:
         ({"most_force": 0.5}, "least_force"),
         ({"learn_stick_ratio": 0.6}, "learn_stick_ratio"),
         ({"fall_rate": np.ones(2)}, "fall_rate"),
+        ({"contact": 6e-5}, "contact"),
     ],
 )
 def test_a_setting_outside_of_its_range_is_refused_by_name(wrong: dict[str, Any], name: str) -> None:

@@ -235,3 +235,9 @@ def test_a_file_that_holds_no_model_is_refused(tmp_path: Path, content: str, mes
 def test_a_model_is_asked_at_a_velocity_and_a_force(make_model: Make, arguments: Any, message: str) -> None:
     with pytest.raises(InvalidArgument, match=message):
         make_model().predict(*arguments)
+
+
+@pytest.mark.parametrize("wrong", [{}, None, "wood", [], {"format": "stiction"}])
+def test_what_is_no_record_of_a_model_is_refused_as_such(wrong: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"record is one that lacks or garbles .*; allowed: what to_json and the"):
+        FrictionModel.from_json(wrong)

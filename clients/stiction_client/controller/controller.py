@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+from stiction_client.arguments import of_kind
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.recognition import UNKNOWN, GripRecognition
@@ -64,9 +65,11 @@ def init(
     """A controller that has seen nothing; ``model``: of the object's material, where that is known.
 
     ``materials``: without a ``model``, those among which the object's is to be recognised, by name. Raises
-    ``InvalidArgument`` for one that is called "unknown".
+    ``InvalidArgument`` for one that is called "unknown", and for what are no settings or models.
     """
+    of_kind("settings", settings, ControlSettings)
     if model is not None:
+        of_kind("model", model, FrictionModel)
         return ControllerState(
             settings, KnownFriction.of_model(model, settings), "hold", _floor(settings, rested=False)
         )

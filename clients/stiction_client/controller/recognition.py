@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stiction_client.arguments import of_kind
 from stiction_client.controller.friction import KnownFriction, error_of_mean, utilisation
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.defaults import UNKNOWN_FRICTION, UNKNOWN_LEVEL, UNKNOWN_SHARE
@@ -40,7 +41,12 @@ class GripRecognition:
 
     @classmethod
     def among(cls, models: Mapping[str, FrictionModel], settings: ControlSettings) -> "GripRecognition | None":
-        """Of these materials; None of none. Raises ``InvalidArgument`` for one that is called "unknown"."""
+        """Of these materials; None of none. Raises ``InvalidArgument`` for one that is called "unknown", and for what
+        is no model.
+        """
+        of_kind("materials", models, Mapping)
+        for name, model in models.items():
+            of_kind(f"materials[{name!r}]", model, FrictionModel)
         if UNKNOWN in models:
             raise InvalidArgument("materials", sorted(models), f'names other than "{UNKNOWN}"')
         if not models:

@@ -4,6 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from stiction_client.arguments import of_kind, shown
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 
@@ -60,6 +63,11 @@ class Command:
 
 def check(observation: Observation, last: float) -> None:
     """Refuse an observation that cannot be, or is no later than ``last`` s; raises ``InvalidArgument``."""
+    of_kind("observation", observation, Observation)
+    for name in ("time", "normal", "tangential", "torque", "stick_ratio"):
+        value = getattr(observation, name)
+        if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+            raise InvalidArgument(name, shown(value), "a number")
     if not last < observation.time < math.inf:
         raise InvalidArgument("time", observation.time, f"finite, later than {last:.9g} s")
     for name in ("normal", "tangential", "torque"):
@@ -69,6 +77,7 @@ def check(observation: Observation, last: float) -> None:
     if not (math.isnan(observation.stick_ratio) or 0.0 <= observation.stick_ratio <= 1.0):
         raise InvalidArgument("stick_ratio", observation.stick_ratio, "0 to 1, or NaN where none is known")
     if observation.slip_samples is not None:
+        of_kind("slip_samples", observation.slip_samples, SlipSamples)
         _check_samples(observation.slip_samples)
 
 
@@ -77,6 +86,7 @@ def _check_samples(samples: SlipSamples) -> None:
         raise InvalidArgument("slip_samples.moving", samples.moving, "0 to 1")
     for name in ("friction_coefficient", "normal_force"):
         values = getattr(samples, name)
+        of_kind(f"slip_samples.{name}", values, np.ndarray)
         if values.shape != samples.friction_coefficient.shape or values.ndim != 1:
             raise InvalidArgument(f"slip_samples.{name}", f"of shape {list(values.shape)}", "two arrays [k]")
         numbers = values.tolist()  # a few dozen, sooner compared one by one than by NumPy

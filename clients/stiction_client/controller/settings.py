@@ -4,7 +4,7 @@ import warnings
 from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, get_type_hints
 
-from stiction_client.arguments import within
+from stiction_client.arguments import of_kind, within
 from stiction_client.contacts import Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.planner import SLIP_PROBABILITIES, SLIP_PROBABILITY
@@ -117,6 +117,7 @@ class ControlSettings:
     def __post_init__(self) -> None:
         if self.contradiction_share != WITHOUT_EFFECT:
             warnings.warn("contradiction_share has no effect any more", DeprecationWarning, stacklevel=3)
+        of_kind("contact", self.contact, Contact)
         for name, gain in gains().items():
             value = getattr(self, name)
             if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):
