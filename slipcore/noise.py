@@ -21,11 +21,12 @@ def median(values: FloatArray) -> float:
 def ranked(values: FloatArray, rank: int) -> float:
     """The value [k] that so many of them precede in order, by selection; their order is changed.
 
-    Partitioned without a branch in the inner loop (Lomuto), which random values would mispredict every other time.
+    Partitioned without a branch in the inner loop (Lomuto), which random values would mispredict every other time, at
+    the median of five of them, which leaves about half as many to go through as any single one.
     """
     low, high = 0, len(values)
     while True:
-        pivot = values[(low + high) // 2]
+        pivot = middle_of_five(values, low, (high - low) // 5)
         less = low
         for k in range(low, high):
             value = values[k]
@@ -43,6 +44,15 @@ def ranked(values: FloatArray, rank: int) -> float:
             if rank < less:
                 return float(pivot)
             low = less
+
+
+@compiled
+def middle_of_five(values: FloatArray, first: int, step: int) -> float:
+    """The median of the five values from ``first`` on, a ``step`` apart; of numbers alone."""
+    a, b, c = values[first], values[first + step], values[first + 2 * step]
+    d, e = values[first + 3 * step], values[first + 4 * step]
+    larger, smaller = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
+    return float(max(min(e, larger), min(max(e, larger), smaller)))
 
 
 @compiled

@@ -137,7 +137,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
     setup, last = state.setup, unwritten(state.frame)
     displacement, force = sharpened(frame.displacement, frame.force, setup.options, setup.element_area)
-    seen = frame_arrays(frame._replace(displacement=displacement, force=force))
+    seen = frame_arrays(frame, displacement, force)
     method, memory = find_method(setup.method), state.memory
     sensor, after, of_method = setup.sensor, empty_like(memory), None
     shape = memory.probability.shape
@@ -166,12 +166,14 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     )
 
 
-def frame_arrays(frame: Frame) -> FrameArrays:
-    """A frame as kernels take it, not to be written to; what it does not have is empty."""
+def frame_arrays(frame: Frame, displacement: FloatArray, force: FloatArray | None) -> FrameArrays:
+    """A frame with this displacement and force as kernels take it, not to be written to; what it does not have is
+    empty.
+    """
     return FrameArrays(
         frame.time,
-        read_only(frame.displacement),
-        NO_FIELD if frame.force is None else read_only(frame.force),
+        read_only(displacement),
+        NO_FIELD if force is None else read_only(force),
         NO_POSE if frame.object_pose is None else read_only(frame.object_pose),
         NO_FIELD if frame.normal is None else read_only(frame.normal),
         NO_MASK if frame.contact is None else read_only(frame.contact),
@@ -322,5 +324,5 @@ def _plain_copy(value: ArrayLike, shape: tuple[int, ...]) -> FloatArray | None:
 
 
 def _unwritable(array: FloatArray) -> FloatArray:
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from slipcore.detection.shared.observe import step_noise
-from slipcore.noise import estimate_noise
+from slipcore.noise import estimate_noise, ranked
 
 
 def smooth(time: np.ndarray) -> np.ndarray:
@@ -86,3 +86,11 @@ def test_an_online_estimate_looks_at_few_elements_and_skips_repeated_frames() ->
     assert marker == pytest.approx(1e-6, rel=0.1)  # 64 of 400 elements: 2 %, and uneven thirds of a second
     assert pressing == pytest.approx(1e-6, rel=0.1)
     assert noise[2, 2] == 60.0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 9, 64, 290])
+def test_selection_finds_the_value_that_so_many_precede_in_order(count: int) -> None:
+    rng = np.random.default_rng(count)
+    for values in (rng.standard_normal(count), np.round(rng.standard_normal(count)), np.arange(1.0 * count)):
+        for rank in {0, count // 4, count // 2, count - 1}:
+            assert ranked(values[::-1].copy(), rank) == np.sort(values)[rank]

@@ -397,13 +397,16 @@ def decide(posterior: FloatArray, expected: FloatArray, threshold: float, decisi
     n, m = posterior.shape
     odds = (1.0 - threshold) / threshold
     for i in range(n):
-        factors = decision.probability[i]
-        factors[:] = expected[i]
-        exponentials(factors)
+        p = decision.probability[i]
+        p[:] = expected[i]
+        if p.any():  # beside forces nothing is expected
+            exponentials(p)
+            for j in range(m):
+                likely = posterior[i, j] * p[j]
+                both = likely / (1.0 - posterior[i, j] + likely)
+                p[j] = both if expected[i, j] != 0.0 else posterior[i, j]
+        else:
+            p[:] = posterior[i]
         for j in range(m):
-            p = posterior[i, j]
-            if expected[i, j] != 0.0:
-                likely = p * factors[j]
-                p = likely / (1.0 - p + likely)
-            decision.slip[i, j] = p > threshold
-            decision.probability[i, j] = p * odds / (1.0 - p + p * odds)
+            decision.slip[i, j] = p[j] > threshold
+            p[j] = p[j] * odds / (1.0 - p[j] + p[j] * odds)

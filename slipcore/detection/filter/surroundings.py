@@ -90,12 +90,16 @@ def distance_from(was: BoolArray, contact: BoolArray, distance: FloatArray) -> i
     if 0 < touching < n * m:
         for i in range(n):
             spread_across(distance[max(i - 1, 0)], distance[i])
-            for j in range(1, m):
-                distance[i, j] = min(distance[i, j], distance[i, j - 1] + 1.0)
+            near = math.inf
+            for j in range(m):
+                near = min(distance[i, j], near + 1.0)
+                distance[i, j] = near
         for i in range(n - 1, -1, -1):
             spread_across(distance[min(i + 1, n - 1)], distance[i])
-            for j in range(m - 2, -1, -1):
-                distance[i, j] = min(distance[i, j], distance[i, j + 1] + 1.0)
+            near = math.inf
+            for j in range(m - 1, -1, -1):
+                near = min(distance[i, j], near + 1.0)
+                distance[i, j] = near
     return touching
 
 
@@ -104,13 +108,11 @@ def spread_across(beside: FloatArray, row: FloatArray) -> None:
     """Bring distances in a ``row`` [m] down to those by way of the one ``beside`` it, straight or aslant; its own are
     never nearer by way of themselves.
     """
-    m, aslant = len(row), math.sqrt(2.0)
-    for j in range(m):
-        row[j] = min(row[j], beside[j] + 1.0)
-    for j in range(1, m):
-        row[j] = min(row[j], beside[j - 1] + aslant)
-    for j in range(m - 1):
-        row[j] = min(row[j], beside[j + 1] + aslant)
+    last, aslant = len(row) - 1, math.sqrt(2.0)
+    for j in range(1, last):
+        row[j] = min(min(row[j], beside[j] + 1.0), min(beside[j - 1], beside[j + 1]) + aslant)
+    row[0] = min(row[0], min(beside[0] + 1.0, beside[min(1, last)] + aslant))
+    row[last] = min(row[last], min(beside[last] + 1.0, beside[max(last - 1, 0)] + aslant))
 
 
 @compiled

@@ -91,6 +91,9 @@ def bend(field: FloatArray, i: int, j: int, a: int) -> float:
 @compiled
 def seek_steps(displacement: FloatArray, found: FloatArray, series: FloatArray) -> None:
     """Keep in ``found`` what ``seek_step`` does of places in the plane, and then of depth; evenly chosen elements."""
+    if min(found[1], found[3]) > 0.0:  # as long as neither is sought, as in most frames, no place is looked at
+        found[1], found[3] = found[1] - 1.0, found[3] - 1.0
+        return
     n, m, _ = displacement.shape
     count = min(n * m, SERIES)
     place = displacement.reshape(n * m, 3)

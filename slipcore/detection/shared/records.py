@@ -21,7 +21,7 @@ def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
     if not array.flags.writeable:
         return array
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)  # half as slow as by ``flags``
     return view
 
 

@@ -76,6 +76,20 @@ def test_steps_of_places_and_of_depth_are_kept_apart() -> None:
     np.testing.assert_allclose(found, [1e-6, 0.0, 5e-6, 0.0], rtol=1e-3, atol=1e-15)
 
 
+def test_no_place_is_looked_at_while_no_step_is_sought() -> None:
+    nothing = np.full((3, 3, 3), np.nan)
+    found = np.array([1e-6, 2.0, 0.0, 5.0])
+    lasting_noise.seek_steps(nothing, found, np.empty((2, SERIES)))
+    np.testing.assert_array_equal(found, [1e-6, 1.0, 0.0, 4.0])
+
+
+def test_of_depth_a_step_is_sought_while_none_is_in_the_plane() -> None:
+    displacement, found = np.zeros((3, 3, 3)), np.array([0.0, 2.0, 0.0, 0.0])
+    displacement[..., 2] = 5e-6 * np.arange(9.0).reshape(3, 3)
+    lasting_noise.seek_steps(displacement, found, np.empty((2, SERIES)))
+    np.testing.assert_allclose(found, [0.0, 1.0, 5e-6, 0.0], rtol=1e-3)
+
+
 def test_the_size_of_a_field_is_what_its_components_scatter_by() -> None:
     field = np.full((2, 2, 3), 7.0)
     field[..., 0] = [[1.0, 3.0], [1.0, 3.0]]
