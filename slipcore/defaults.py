@@ -493,6 +493,8 @@ class FilterOptions(ContactOptions):
     """Over so many frames it is estimated how much of their motion is jitter."""
     surroundings_jitter: Annotated[float, Option(0.0, 1.0, "-", "a camera that stands still is left out of it")] = 0.5
     """Least share of jitter in their motion at which this is the camera's."""
+    surroundings_noise: Annotated[float, Option(0.0, 1e6, "variances of their mean", "tuning scenes")] = 2.0
+    """Least jitter of their mean, over what their own noise makes of it, at which it is the camera's."""
     surroundings_outlier: Annotated[float, Option(1.0, 1e6, "median absolute deviations", "4 σ")] = 6.0
     """Such a marker says nothing in that step."""
     following_weight: Annotated[float, Option(0.0, 1000000.0, "-", "all of the motion, ± 0.2")] = 30.0

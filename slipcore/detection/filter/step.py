@@ -42,7 +42,7 @@ from slipcore.detection.filter.state import (
     STICK_Y,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
-from slipcore.detection.filter.surroundings import shakes, shift_of_surroundings
+from slipcore.detection.filter.surroundings import jitters, shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
@@ -100,8 +100,9 @@ def step_elements(
     lasting = tell_noise(room.surface, tuning, common)
     places = room.places[: find_places(elements, stays, room.places)]
     anchors, motion, deeper, change, evidence, seen, states = rooms_of(room.rows, len(places))
-    shift = shift_of_surroundings(last, frame, before.contact, after.contact, room.weight, room.rows, tuning, common)
-    common[SHAKING] = 1.0 if shakes(variance, tuning, common) else 0.0
+    touches, aside = (before.contact, after.contact), (room.weight, room.rows)
+    shift = shift_of_surroundings(last, frame, touches, variance, aside, tuning, common)
+    common[SHAKING] = 1.0 if jitters(tuning.surroundings_jitter * variance, tuning, common) else 0.0
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, stored_pose(before.common, POSE), last, frame, variance, tuning, common)
     held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, common)

@@ -14,20 +14,21 @@ from slipcore.noise import median
 def shift_of_surroundings(
     last: FrameArrays,
     frame: FrameArrays,
-    was: BoolArray,
-    contact: BoolArray,
-    distance: FloatArray,
-    rows: FloatArray,
+    touches: tuple[BoolArray, BoolArray],
+    variance: float,
+    room: tuple[FloatArray, FloatArray],
     tuning: Tuning,
     common: FloatArray,
 ) -> tuple[float, float]:
     """How far the camera has moved since the first frame, x and y m, as markers around the contact show; in ``common``.
 
-    It moves as they do in the mean while ``surroundings_jitter`` of their motion is jitter. Those count that lie
-    ``surroundings_reach`` contact radii or more from what touches, without outliers: the mean of the same markers adds
-    up to no random walk. Fewer than ``surroundings_least`` say nothing. As their motion has the gel's own in it, too,
-    they say nothing beside a pose that is given unless the camera is ``SHAKING``. ``distance`` [n, m], ``rows``: room.
+    It moves as they do in the mean while ``surroundings_jitter`` of their motion is jitter, and more of it than the
+    ``variance`` of each, m², makes. Those count that lie ``surroundings_reach`` contact radii or more from what
+    ``touches``, [n, m] before and now, without outliers: the mean of the same markers adds up to no random walk. Fewer
+    than ``surroundings_least`` say nothing. As their motion has the gel's own in it, too, they say nothing beside a
+    pose that is given unless the camera is ``SHAKING``. ``room``: [n, m] for distances, and rows.
     """
+    (was, contact), (distance, rows) = touches, room
     touching = distance_from(was, contact, distance)
     reach = max(1.0, tuning.surroundings_reach * math.sqrt(touching / math.pi))
     count = find_steps(last.displacement, frame.displacement, distance, reach, rows)
@@ -35,7 +36,7 @@ def shift_of_surroundings(
         u, v = usual_step(rows[:, :count], tuning.surroundings_outlier)
         add_step(u, v, tuning, common)
         heard = common[SHAKING] > 0.0 or not frame.object_pose.size
-        if heard and share_of_jitter(tuning, common) >= tuning.surroundings_jitter:
+        if heard and jitters(tuning.surroundings_noise * variance / count, tuning, common):
             common[SHIFT] += u
             common[SHIFT + 1] += v
     else:  # what was seen of a shake before may be over
@@ -44,13 +45,12 @@ def shift_of_surroundings(
 
 
 @compiled
-def shakes(variance: float, tuning: Tuning, common: FloatArray) -> bool:
-    """Whether markers around the contact jitter together by ``surroundings_jitter`` of the ``variance`` of one, m², or
-    more: white noise of variance σ² along x and y adds 12σ² to Σb² each frame.
+def jitters(least: float, tuning: Tuning, common: FloatArray) -> bool:
+    """Whether ``surroundings_jitter`` of how the markers around the contact move together is jitter, and this has the
+    ``least`` variance, m², or more: white noise of variance σ² along x and y adds 12σ² to Σb² each frame.
     """
     together = common[JITTER] / (12.0 * tuning.surroundings_memory)
-    jitters = share_of_jitter(tuning, common) >= tuning.surroundings_jitter
-    return bool(jitters and together >= tuning.surroundings_jitter * variance)
+    return bool(share_of_jitter(tuning, common) >= tuning.surroundings_jitter and together >= least)
 
 
 @compiled

@@ -41,6 +41,7 @@ class Tuning(NamedTuple):
     surroundings_least: float
     surroundings_memory: float
     surroundings_jitter: float
+    surroundings_noise: float
     surroundings_outlier: float
     following_weight: float
     pose_noise_least: float

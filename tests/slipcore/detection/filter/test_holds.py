@@ -96,12 +96,22 @@ def test_a_hold_after_a_scene_moves_no_probability(scene: Callable[..., GraspLog
         assert (history.contact[-570:] == history.contact[-1]).all()
 
 
+@pytest.mark.parametrize("marker_noise", [3e-6, 1e-5])
+def test_few_markers_around_a_large_contact_end_no_hold_by_their_own_noise(marker_noise: float) -> None:
+    """What they jitter by in the mean was taken for a camera that shakes, and the object seemed to."""
+    rim = next(case for case in tuning() if case.name == "rim of a cup")
+    assert drift(detect_slip(held(simulated(rim), 600, 30.0, marker_noise, "displacement")), 600, 30) <= 0.01
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(("rate", "every"), [(30.0, 1), (120.0, 6), (1000.0, 6)])
-@pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
-def test_with_forces_little_changes_in_a_hold_of_any_scene(marker_noise: float, rate: float, every: int) -> None:
+@pytest.mark.parametrize("marker_noise", [1e-6, 3e-6, 1e-5])
+@pytest.mark.parametrize("inputs", ["forces", "displacement"])
+def test_without_a_pose_little_changes_in_a_hold_of_any_scene(
+    inputs: str, marker_noise: float, rate: float, every: int
+) -> None:
     frames = round(20.0 * rate)
-    logs = [held(simulated(case), frames, rate, marker_noise, "forces") for case in tuning()[::every]]
+    logs = [held(simulated(case), frames, rate, marker_noise, inputs) for case in tuning()[::every]]
     found = np.array([drift(detect_slip(log), frames, round(rate)) for log in logs])
     assert found.max() <= 0.01
 
@@ -114,10 +124,10 @@ def test_a_hold_of_an_object_that_was_turned_by_a_known_pose_moves_no_probabilit
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("inputs", "marker_noise"), [("displacement", 1e-5), ("motion", 1e-6), ("motion", 1e-5)])
-def test_without_forces_or_with_the_pose_few_scenes_change_in_a_hold(inputs: str, marker_noise: float) -> None:
-    """Single scenes do, by up to .22 (docs/detector.md): no promise for each scene."""
-    logs = [held(simulated(case), 600, 30.0, marker_noise, inputs) for case in tuning()]
+@pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
+def test_with_the_pose_few_scenes_change_in_a_hold(marker_noise: float) -> None:
+    """One does, by .07 (docs/detector.md): no promise for each scene."""
+    logs = [held(simulated(case), 600, 30.0, marker_noise, "motion") for case in tuning()]
     found = np.array([drift(detect_slip(log), 600, 30) for log in logs])
     assert found.mean() <= 0.01
     assert (found > 0.01).sum() <= 2

@@ -64,23 +64,23 @@ def test_jitter_is_told_by_changes_of_the_step_that_turn_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("squares", "products", "variance", "expected"),
+    ("squares", "products", "least", "expected"),
     [
+        (48e-12, -30e-12, 0.5e-12, True),
         (48e-12, -30e-12, 1e-12, True),
-        (48e-12, -30e-12, 2e-12, True),  # half of it
-        (48e-12, -30e-12, 2.1e-12, False),
-        (48e-12, -15e-12, 1e-12, False),  # mostly an even motion
-        (0.0, 0.0, 1e-12, False),
+        (48e-12, -30e-12, 1.05e-12, False),
+        (48e-12, -15e-12, 0.5e-12, False),  # mostly an even motion
+        (0.0, 0.0, 0.5e-12, False),
     ],
 )
-def test_a_camera_shakes_where_most_of_the_noise_is_a_jitter_in_common(
-    squares: float, products: float, variance: float, expected: bool
+def test_markers_jitter_together_where_most_of_their_motion_does_and_by_enough(
+    squares: float, products: float, least: float, expected: bool
 ) -> None:
     """Squares of 48 µm² over four frames are those of 1 µm along x and along y."""
     common = np.zeros(COMMON)
     common[JITTER : JITTER + 2] = squares, products
     tuning = TUNING._replace(displacement_floor=0.0)
-    assert unwrap(surroundings.shakes)(variance, tuning, common) == expected
+    assert unwrap(surroundings.jitters)(least, tuning, common) == expected
 
 
 def test_a_shake_is_forgotten_where_too_few_markers_are_left_to_show_it() -> None:
@@ -88,8 +88,8 @@ def test_a_shake_is_forgotten_where_too_few_markers_are_left_to_show_it() -> Non
     common[JITTER : JITTER + 2] = 48e-12, -30e-12
     frame = FrameArrays(0.0, np.zeros((5, 5, 3)), NO_FIELD, np.zeros(3), NO_FIELD, contact)
     room = np.empty((5, 5)), np.empty((3, 25))
-    unwrap(surroundings.shift_of_surroundings)(frame, frame, contact, contact, *room, TUNING, common)
-    assert not unwrap(surroundings.shakes)(1e-12, TUNING, common)
+    unwrap(surroundings.shift_of_surroundings)(frame, frame, (contact, contact), 0.0, room, TUNING, common)
+    assert not unwrap(surroundings.jitters)(0.5e-12, TUNING, common)
 
 
 def shifted(
@@ -98,6 +98,7 @@ def shifted(
     pose: np.ndarray = NO_POSE,
     width: int = 5,
     shaking: float = 0.0,
+    noise: float = 0.0,
 ) -> np.ndarray:
     """Where the camera is said to be after steps of all markers but the middle one, which touches."""
     common, contact = np.zeros(COMMON), np.zeros((width, width), bool)
@@ -110,7 +111,7 @@ def shifted(
         moved[~contact] += [u, v, 0.0]
         last, frame = (FrameArrays(0.0, each, NO_FIELD, pose, NO_FIELD, contact) for each in (place, moved))
         room = np.empty((width, width)), np.empty((3, width**2))
-        found = shift(last, frame, contact, contact, *room, tuning, common)
+        found = shift(last, frame, (contact, contact), noise**2, room, tuning, common)
         place = moved
     assert found == (common[SHIFT], common[SHIFT + 1])
     return np.array(found)
@@ -124,6 +125,15 @@ def test_a_camera_is_where_markers_that_jitter_took_it() -> None:
     np.testing.assert_allclose(shifted(TO_AND_FRO), [-1e-5, 2e-5], rtol=1e-9)
     np.testing.assert_allclose(shifted(TO_AND_FRO[:-1]), [0.0, 0.0], rtol=0.0, atol=1e-18)
     assert not shifted([(1e-5, 0.0)] * 8).any()
+
+
+def test_what_markers_jitter_by_themselves_moves_no_camera() -> None:
+    """Eight around one, so that a noise of σ gives their mean σ²/8, and twice that is needed."""
+    near = TUNING._replace(surroundings_reach=1.0)
+    alike = shifted(TO_AND_FRO, near, width=3)
+    own = np.sqrt(8.0 / near.surroundings_noise * (1e-5**2 + 2e-5**2) / 3.0)  # steps to and fro: b = 2a, Σb² = 4·5a²
+    np.testing.assert_array_equal(shifted(TO_AND_FRO, near, width=3, noise=0.5 * own), alike)
+    assert not shifted(TO_AND_FRO, near, width=3, noise=2.0 * own).any()
 
 
 def test_too_few_markers_say_nothing_nor_do_they_beside_a_given_pose_unless_the_camera_shakes() -> None:
