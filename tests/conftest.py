@@ -48,8 +48,6 @@ GARBAGE = (10_000, 20, 50)
 at Python's 700, 10 and 10.
 """
 
-ENGINES = ("sqlite", "postgresql")
-
 RAMP_FRAMES = 2000
 """Kept in a process, of 10 to 30 kB each."""
 
@@ -178,7 +176,7 @@ def real_migrations(migrations: Remembered, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("db.migrate.compare_metadata", migrations.real_compare)
 
 
-@pytest.fixture(scope="session", params=ENGINES)
+@pytest.fixture(scope="session", params=["sqlite", "postgresql"])
 def engine_name(request: pytest.FixtureRequest) -> str:
     """Each database that the service runs on."""
     name: str = request.param
