@@ -81,11 +81,11 @@ def open_session(
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model, materials)
     forces = None if gel is None else Reconstructing(gel, limit.owner)
-    is_open = with_forces != without
+    depends = with_forces != without  # on what frames have
     _SESSIONS[name] = DetectorSession(
-        detector, at_rest, area, moments, limit, kept, is_open, grip=grip, forces=forces, held_bytes=held
+        detector, at_rest, area, moments, limit, kept, depends, grip=grip, forces=forces, held_bytes=held
     )
-    return None if is_open else without
+    return None if depends else without
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
