@@ -112,6 +112,7 @@ def test_a_signal_to_all_processes_ends_them_and_starts_none(service: Service) -
 def test_the_process_ends_when_the_server_is_killed(service: Service) -> None:
     address, process = service.look_ups
     httpx.get(f"{address}/healthz", timeout=PATIENCE).raise_for_status()
+    assert not is_gone(process)
     service.process.kill()
     service.process.join()
     wait_until(lambda: is_gone(process), "the process to end", PATIENCE)

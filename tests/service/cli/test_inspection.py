@@ -36,6 +36,7 @@ def test_some_frames_of_a_log_compare_as_all_of_them_do(tmp_path: Path) -> None:
     path.write_text(json.dumps(gel.to_json()), encoding="utf-8")
     some, whole = comparison(log, path), compare_forces(log, reconstruct(log, gel))
     assert some is not None
+    # frames of the pull have another share of 20 than of all: three seeds differ by .021 (tangential) and .009 at most
     for name in ("normal", "tangential", "total_normal", "total_tangential"):
         np.testing.assert_allclose(getattr(some, name).ratio, getattr(whole, name).ratio, rtol=0.03)
         np.testing.assert_allclose(getattr(some, name).correlation, getattr(whole, name).correlation, atol=0.02)

@@ -37,6 +37,12 @@ def test_json_holds_arrays_as_lists_and_no_nan(capsys: Capture) -> None:
     assert out == '{\n  "name": "β",\n  "found": null,\n  "true": true\n}\n'
 
 
-def test_a_table_is_of_no_use_where_nothing_can_be_printed_and_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.stdout", None)
-    print_table("Logs", ("id",), [("1",)])
+def test_a_table_is_of_no_use_where_nothing_can_be_printed_and_no_failure(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    with monkeypatch.context() as without:
+        without.setattr("sys.stdout", None)
+        print_table("Logs", ("id",), [("1",)])
+    assert tuple(capsys.readouterr()) == ("", "")
+    print_table("Logs", ("id",), [("2",)])
+    assert "2" in capsys.readouterr().out

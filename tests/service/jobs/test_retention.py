@@ -243,6 +243,7 @@ def test_a_server_deletes_old_uploads_by_itself(
             done = update(JobRow).values(status="done", finished_at=now(), runner_id=None)
             session.execute(done)
         wait_until(lambda: client.get(f"/v1/grasp-logs/{log}/file").status_code == httpx.codes.GONE, "the file to go")
+        assert client.get(f"/v1/grasp-logs/{log}").status_code == httpx.codes.OK, "what is known of the log stays"
 
 
 @ONLY_SQLITE

@@ -130,17 +130,22 @@ def test_runners_share_the_jobs_and_each_is_done_once(
 def test_a_job_that_is_stored_is_begun_at_once_when_the_runner_is_woken(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
+    begun, added = list[str](), list[str]()
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        finish(database, claim)
+
     def store(runner: JobRunner) -> None:
         until_finished(database, queued)(runner)
         with database.write() as session:
-            extra = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+            added.append(jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper")))
         runner.wake()
-        until_finished(database, [extra])(runner)
+        until_finished(database, added)(runner)
 
     longer_than_waits = 600.0
-    working(
-        lambda claim: finish(database, claim), store, poll_seconds=longer_than_waits, lease_seconds=longer_than_waits
-    )
+    working(do, store, poll_seconds=longer_than_waits, lease_seconds=longer_than_waits)
+    assert begun[-1:] == added
 
 
 def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(

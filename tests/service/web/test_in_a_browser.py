@@ -213,7 +213,9 @@ def test_the_api_is_described_without_a_network(page: Tab, client: httpx.Client)
     page.go(f"{base}/docs")
     page.until("document.querySelectorAll('.opblock').length > 20")
     page.call("Page.navigate", url=f"{base}/redoc")
-    page.until("location.pathname === '/docs'")
+    assert page.until("location.pathname === '/docs'")
+    loaded = page.run("performance.getEntriesByType('resource').map(each => new URL(each.name).origin).join(' ')")
+    assert set(loaded.split()) == {base}
 
 
 @ON_SQLITE
