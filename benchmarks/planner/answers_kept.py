@@ -143,16 +143,20 @@ class Followed(NamedTuple):
 
 
 def told(models: Sequence[FrictionModel], loads: Array, asked: float) -> Array:
-    """Forces [models, loads] that keep slip so rare; infinite where none does."""
-    forces = [required_normal_force(model, loads, asked, **ASKED_OF).normal_force for model in models]
+    """Smallest and largest forces [2, models, loads] that keep slip so rare; infinite where none does."""
+    found = [required_normal_force(model, loads, asked, **ASKED_OF).feasible_interval for model in models]
+    forces = np.stack(found, axis=1)
     return np.where(np.isnan(forces), np.inf, forces)
 
 
 def kept(forces: Array, lenient: Array) -> Array:
-    """Forces [logs, loads] with answers that stay, and no less than they were, while the ``lenient`` rule has one."""
+    """Forces [logs, loads] with answers that stay while the ``lenient`` rule, [2, logs, loads], has one, as near to
+    what they were as it allows: the rule of the worked example.
+    """
     found = forces.copy()
-    for now, before, last in zip(found[1:], found, lenient[1:], strict=False):
-        now[:] = np.where(np.isfinite(now), now, np.maximum(before, last))
+    for now, before, (low, high) in zip(found[1:], found, lenient.swapaxes(0, 1)[1:], strict=False):
+        stays = np.where(np.isfinite(before), np.clip(before, low, high), np.inf)
+        now[:] = np.where(np.isfinite(now), now, stays)
     return found
 
 
@@ -161,10 +165,10 @@ def followed(seed: int, median: float, learnt: ScatterPrior) -> list[Followed]:
     kind, logs, least = material(seed, median, COUNT)
     loads = np.array([load_of(kind, float(force), ASKED[0]) for force in least])
     default, others, population = (growing(logs, prior) for prior in (ScatterPrior(), learnt, LogNormalScatter(median)))
-    forces = [told(each, loads, ASKED[0]) for each in (default, others, population)]
+    forces = [told(each, loads, ASKED[0])[0] for each in (default, others, population)]
     forces.append(kept(forces[0], told(default, loads, LENIENT * ASKED[0])))
     wider = growing(logs, ScatterPrior(scale=WIDER))
-    forces += [told([*map(PositiveFactor.of, models)], loads, ASKED[0]) for models in (default, wider, population)]
+    forces += [told([*map(PositiveFactor.of, models)], loads, ASKED[0])[0] for models in (default, wider, population)]
     return [Followed(kind, loads, each) for each in forces]
 
 
@@ -200,7 +204,7 @@ def of_shapes(seed: int, median: float, *, normal: bool) -> list[tuple[NDArray[n
     for _, power, scale in SHAPES:
         models = growing(logs, ScatterPrior() if scale is None else ScatterPrior(scale=scale))
         models = models if power == 1.0 else [PositiveFactor.of(each, power) for each in models]
-        forces = {asked: told(models, each, asked) for asked, each in loads.items()}
+        forces = {asked: told(models, each, asked)[0] for asked, each in loads.items()}
         slipped = [[_mean_slip(kind, loads[asked], forces[asked][k - 1], asked) for k in GROWN] for asked in ASKED]
         found.append((np.isfinite(forces[ASKED[0]]), np.array(slipped)))
     return found

@@ -116,7 +116,8 @@ class NoFeasibleForce(StictionError):
 
     ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N; ``cause``: whether
     physics, the limit, the range of the data or ignorance is why; ``largest_observed``: greatest normal force of an
-    element in the data, N, where it is known.
+    element in the data, N, where it is known; ``least_slip_probability``: the least with which a force does hold, None
+    where none does by ½.
     """
 
     def __init__(
@@ -127,11 +128,14 @@ class NoFeasibleForce(StictionError):
         reason: str,
         cause: Cause | str = "",
         largest_observed: float | None = None,
+        least_slip_probability: float | None = None,
     ) -> None:
         self.tangential_load, self.largest_load = tangential_load, largest_load
         self.normal_force, self.reason, self.cause = normal_force, reason, cause
-        self.largest_observed = largest_observed
-        super().__init__(tangential_load, largest_load, normal_force, reason, cause, largest_observed)
+        self.largest_observed, self.least_slip_probability = largest_observed, least_slip_probability
+        super().__init__(
+            tangential_load, largest_load, normal_force, reason, cause, largest_observed, least_slip_probability
+        )
 
     def __str__(self) -> str:
         most = (
@@ -141,4 +145,6 @@ class NoFeasibleForce(StictionError):
         )
         up_to = "" if self.largest_observed is None else f", {self.largest_observed:.4g} N an element,"
         because = f"; {_CAUSES[self.cause].format(observed=up_to)}" if self.cause else ""
-        return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}{because}"
+        least = self.least_slip_probability
+        instead = "" if least is None else f"; with a slip probability of {least:g} it would be held"
+        return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}{because}{instead}"

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING
+from decimal import Context as Rounding
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -174,18 +176,20 @@ def required_normal_force(
         limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
     unit = together.contact.element_force(1.0, model.element_area)
 
-    def loaded_with(count: Number) -> LoadedContact:
-        quantile = FrictionQuantile.of(model, velocity, probability, count)
-        return LoadedContact(quantile, load, moment, unit, together.contact.power)
+    def asked(probability: Number) -> _Question:
+        def loaded_with(count: Number) -> LoadedContact:
+            quantile = FrictionQuantile.of(model, velocity, probability, count)
+            return LoadedContact(quantile, load, moment, unit, together.contact.power)
 
-    kind = _kind(model, of)
-    count = _averaged(kind, elements, together.contact, model.element_area, loaded_with)
-    loaded = loaded_with(count)
-    question = _Question(model, together, velocity, probability, limit, loaded, kind, count)
-    given = (load, moment, loaded.unit, velocity, probability, limit, count)
+        kind = _kind(model, of)
+        count = _averaged(kind, elements, together.contact, model.element_area, loaded_with)
+        return _Question(model, together, velocity, probability, limit, loaded_with(count), kind, count)
+
+    question = asked(probability)
+    given = (load, moment, question.loaded.unit, velocity, probability, limit, question.elements)
     if any(isinstance(each, np.ndarray) for each in given):
         return _many(question, given)
-    return _one(question, tangential_load, _beside(float(torque), float(safety_factor)))
+    return _one(question, asked, tangential_load, _beside(float(torque), float(safety_factor)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,7 +288,10 @@ def _beside(torque: float, safety_factor: float) -> str:
     return turned + (f", with a safety factor of {safety_factor:g}" if safety_factor > 1.0 else "")
 
 
-def _one(question: _Question, tangential_load: Number, beside: str) -> RequiredForce:
+def _one(
+    question: _Question, asked: Callable[[Number], _Question], tangential_load: Number, beside: str
+) -> RequiredForce:
+    """The answer to one question; ``asked``: the same at another slip probability."""
     loaded, most = question.loaded, float(question.loaded.root(question.limit))
     low, high, holds = loaded.interval(most)
     best = loaded.best(most)
@@ -298,6 +305,7 @@ def _one(question: _Question, tangential_load: Number, beside: str) -> RequiredF
             _asked(question, beside),
             str(_causes(question)),
             question.model.domain.normal_force[1],
+            _least_slip_probability(asked, float(question.probability)),
         )
     element = float(question.element_force(low))
     outside = question.model.extrapolation(float(question.velocity), element)
@@ -319,6 +327,22 @@ def _one(question: _Question, tangential_load: Number, beside: str) -> RequiredF
         advice=support.advice,
         notes=question.model.notes,
     )
+
+
+def _least_slip_probability(asked: Callable[[Number], _Question], refused: float) -> float | None:
+    """The least above ``refused`` with which a force holds, rounded up to three digits; None where none does by ½."""
+
+    def holds(probability: float) -> bool:
+        question = asked(probability)
+        return bool(question.loaded.interval(question.loaded.root(question.limit))[2])
+
+    below, above = refused, SLIP_PROBABILITIES[1]
+    if not holds(above):
+        return None
+    while above > 1.001 * below:
+        middle = math.sqrt(below * above)
+        below, above = (below, middle) if holds(middle) else (middle, above)
+    return min(float(Rounding(prec=3, rounding=ROUND_CEILING).create_decimal_from_float(above)), SLIP_PROBABILITIES[1])
 
 
 def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:

@@ -93,6 +93,7 @@ class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
         self.largest_load, self.normal_force = self._number("largest_load"), self._number("normal_force")
         self.cause = str(self.facts.get("cause", ""))
         self.largest_observed = self.facts.get("largest_observed")
+        self.least_slip_probability = self.facts.get("least_slip_probability")
 
     def _number(self, name: str) -> float:
         """A number of the problem; NaN where it tells none."""

@@ -87,7 +87,7 @@ MEANINGS: dict[str, ProblemMeaning] = {
     "no-feasible-force": ProblemMeaning(
         "No normal force holds the load; `largest_load` is the most that is held, at `normal_force` N; "
         "`cause` says whether physics, the limit, the range of the data (up to `largest_observed` N an element) "
-        "or ignorance is why (client.md).",
+        "or ignorance is why; `least_slip_probability` is the least with which a force holds (client.md).",
         "Do not lift it so: more contact area, more fingers; or record what the cause asks for.",
     ),
     "job-ended": ProblemMeaning(

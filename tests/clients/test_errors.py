@@ -29,6 +29,13 @@ def test_why_no_force_holds_is_told_with_what_to_do(cause: str, observed: float 
     assert (str(again), again.cause, again.largest_observed) == (str(error), cause, observed)
 
 
+def test_with_which_slip_probability_it_would_be_held_is_told() -> None:
+    error = NoFeasibleForce(50.0, 6.25, 30.0, "slip probability 0.01", "limit", None, 0.0123)
+    assert str(error).endswith("above the limit would hold it; with a slip probability of 0.0123 it would be held")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.least_slip_probability) == (str(error), 0.0123)
+
+
 def test_a_load_that_nothing_holds_has_no_largest_one() -> None:
     assert "; no load is held so at any force" in str(NoFeasibleForce(1.0, 0.0, 0.0, "none"))
     assert "; the largest load held so is 1e-09 N" in str(NoFeasibleForce(1.0, 1e-9, 0.0, "none"))

@@ -240,10 +240,29 @@ def test_a_load_above_the_peak_is_refused_with_the_most_that_can_be_held(make_mo
         required_normal_force(model, 3.8, contact_area=AREA)
     assert caught.value.largest_load == pytest.approx(3.75, rel=1e-14)
     assert caught.value.normal_force == pytest.approx(15.0, rel=1e-6)  # a flat peak is known to half the digits
+    assert caught.value.least_slip_probability is None  # nothing is uncertain: it slips whatever is accepted
     assert "no normal force holds 3.8 N" in str(caught.value)
     assert "3.75 N, at a normal force of 15 N" in str(caught.value)
     copied = pickle.loads(pickle.dumps(caught.value))
     assert (copied.largest_load, str(copied)) == (caught.value.largest_load, str(caught.value))
+
+
+@pytest.mark.parametrize("contact", [Contact.flat(AREA), Contact.round(AREA, 5.0)], ids=["flat", "round"])
+@pytest.mark.parametrize(("load", "limit"), [(3.0, None), (2.0, 6.0)])
+def test_a_refusal_says_which_slip_probability_would_be_held(
+    make_model: Make, contact: Contact, load: float, limit: float | None
+) -> None:
+    """So that a planner can decide whether that is too much, as for an answer that it had before the newest grasp."""
+    model, asked = make_model(scale=0.05), {"contacts": contact, "normal_force_limit": limit}
+    with pytest.raises(NoFeasibleForce) as caught:
+        required_normal_force(model, load, 1e-9, **asked)
+    least = caught.value.least_slip_probability
+    assert least is not None
+    assert f"; with a slip probability of {least:g} it would be held" in str(caught.value)
+    assert required_normal_force(model, load, least, **asked).normal_force > 0.0
+    with pytest.raises(NoFeasibleForce) as again:
+        required_normal_force(model, load, 0.985 * least, **asked)  # three digits, rounded up
+    assert again.value.least_slip_probability == least
 
 
 def test_the_peak_itself_is_still_held(make_model: Make) -> None:

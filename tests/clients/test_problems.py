@@ -52,7 +52,13 @@ def test_what_else_a_problem_tells_is_with_it() -> None:
 
 def test_the_services_planner_refuses_as_the_clients_does() -> None:
     """One concept, whether it is computed here or there: what catches the one catches the other, with its numbers."""
-    facts = {"largest_load": 3.8, "normal_force": 5.0, "cause": "limit", "largest_observed": 0.05}
+    facts = {
+        "largest_load": 3.8,
+        "normal_force": 5.0,
+        "cause": "limit",
+        "largest_observed": 0.05,
+        "least_slip_probability": 0.02,
+    }
     with (
         client_of("/problems/no-feasible-force", 409, **facts) as client,
         pytest.raises(stiction_client.NoFeasibleForce) as caught,

@@ -124,6 +124,7 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
             "normal_force": refusal.normal_force,
             "cause": refusal.cause,
             "largest_observed": refusal.largest_observed,
+            "least_slip_probability": refusal.least_slip_probability,
         }
         raise NoFeasibleForce(str(refusal), facts=facts) from refusal
     except stiction_client.InvalidArgument as error:

@@ -51,3 +51,6 @@ class ProblemOut(BaseModel):
     largest_observed: Annotated[
         float | None, Field(description="Where no force holds: greatest normal force of an element in the data, N")
     ] = None
+    least_slip_probability: Annotated[
+        float | None, Field(description="Where no force holds: the least with which one does; null: none by 0.5")
+    ] = None

@@ -39,10 +39,12 @@ def test_who_knows_the_population_has_its_log_normal_for_a_prior() -> None:
     assert found - found[1] == pytest.approx(np.diff(lognorm(0.4, scale=0.05).logpdf([[0.05] * 3, tau]), axis=0)[0])
 
 
-def test_an_answer_stays_while_the_lenient_rule_has_one_and_is_no_less_than_it_was() -> None:
-    forces = np.array([[3.0, NONE, 3.0], [NONE, 4.0, NONE], [NONE, 2.0, 2.5]])
-    lenient = np.array([[2.0, 5.0, 2.0], [2.5, 3.0, NONE], [3.5, 1.0, 2.0]])
-    assert kept(forces, lenient).tolist() == [[3.0, NONE, 3.0], [3.0, 4.0, NONE], [3.5, 2.0, 2.5]]
+def test_an_answer_stays_while_the_lenient_rule_has_one_and_as_near_to_what_it_was_as_that_allows() -> None:
+    forces = np.array([[3.0, NONE, 3.0, 9.0], [NONE, 4.0, NONE, NONE], [NONE, 2.0, 2.5, NONE]])
+    low = np.array([[2.0, 5.0, 2.0, 1.0], [2.5, 3.0, NONE, 6.0], [3.5, 1.0, 2.0, 2.0]])
+    high = np.where(np.isfinite(low), 8.0, NONE)
+    expected = [[3.0, NONE, 3.0, 9.0], [3.0, 4.0, NONE, 8.0], [3.5, 2.0, 2.5, 8.0]]
+    assert kept(forces, np.stack([low, high])).tolist() == expected
 
 
 def test_of_a_known_scale_a_log_normal_factor_has_its_quantile(model: FrictionModel) -> None:

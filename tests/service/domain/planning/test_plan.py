@@ -83,7 +83,7 @@ def test_a_load_that_nothing_holds_is_refused_with_what_is(known: KnownModel) ->
     with pytest.raises(NoFeasibleForce) as refusal:
         plan.grasp_force(context(known), replace(TASK, tangential_load=50.0, normal_force_limit=10.0))
     facts = refusal.value.facts
-    assert set(facts) == {"largest_load", "normal_force", "cause", "largest_observed"}
+    assert set(facts) == {"largest_load", "normal_force", "cause", "largest_observed", "least_slip_probability"}
     assert facts["normal_force"] == 10.0
 
 
