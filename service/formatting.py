@@ -35,6 +35,12 @@ def at_least(value: float, digits: int = 3) -> str:
     return number(math.ceil(value / unit - 1e-9) * unit, digits)
 
 
+def further_warning(warning: str | None, advice: str) -> str:
+    """What a warning says beyond the advice that stands above it, part of which or all of which it may be."""
+    rest = (warning or "").replace(advice, "")
+    return "; ".join(part for part in rest.split("; ") if part and part not in advice)
+
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

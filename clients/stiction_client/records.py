@@ -204,7 +204,8 @@ class FrictionAnswer:
     """Friction of a material at one velocity (m/s) and normal force (N) of an element of ``element_area`` m².
 
     ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
-    ``elements`` of a "contact"; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
+    ``elements`` of a "contact", and at least 0; ``mean`` that of the linear law, which may fall below 0 far outside of
+    the data; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
     where no method was named; ``support`` and ``advice``, what the answer rests on and what to do about it (None where
     an older service answers); ``notes``, what else is to be known of the model.
     """

@@ -105,10 +105,10 @@ class Model(Protocol):
 class Support:
     """What an answer rests on, and one sentence on what to do about it.
 
-    ``kind``, the first that applies: "implausible" (friction cannot be so, or findings speak against the logs),
-    "stale" (the model is not the material's any more), "not identified" (the data do not show friction there, or no
-    coefficient at all, or are of one grasp by a method that takes the next one to be alike, or the method takes all
-    samples for independent), "extrapolated" (beyond the data), "supported".
+    ``kind``, the first that applies: "implausible" (friction cannot be so there, or within the data, or findings speak
+    against the logs), "stale" (the model is not the material's any more), "not identified" (the data do not show
+    friction there, or no coefficient at all, or are of one grasp by a method that takes the next one to be alike, or
+    the method takes all samples for independent), "extrapolated" (beyond the data), "supported".
     """
 
     kind: Kind
@@ -122,7 +122,7 @@ class Support:
 
 def support(model: Model, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
     """What the answer at v (m/s) and f_n (N an element) rests on; ``stale``: why the model is, if it is."""
-    reason = _implausible(model)
+    reason = _implausible(model) or _below_zero(model, tangential_velocity, normal_force)
     if reason is not None:
         return Support("implausible", reason)
     changed = model.diagnostics.get("surface_change")
@@ -140,7 +140,9 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("not identified", reason)
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
     if outside is not None:
-        return Support("extrapolated", f"{outside}: record a grasp there")
+        part = _uncertainty_outside(model, tangential_velocity, normal_force)
+        known = f"the expected friction is known to within ± {part:.0%} there"
+        return Support("extrapolated", f"{outside}; {known}: record a grasp there")
     return Support("supported", f"the samples determine the expected friction to within ± {part:.1%}")
 
 
@@ -156,13 +158,14 @@ def kinds(
     v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
     if _implausible(model) is not None:
         return np.full(v.shape, "implausible")
-    if stale is not None or model.diagnostics.get("surface_change"):
-        return np.full(v.shape, "stale")
+    below_zero = np.asarray(_interval(model, v, f_n)[0]) <= 0.0
+    is_stale = np.full(v.shape, stale is not None or bool(model.diagnostics.get("surface_change")))
     identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
     unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
-    return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
+    each = {"implausible": below_zero, "stale": is_stale, "not identified": unknown, "extrapolated": outside}
+    return np.select([*each.values()], [*each], "supported")
 
 
 def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str | None:
@@ -287,6 +290,23 @@ def _implausible(model: Model) -> str | None:
                 "look for a log with wrong forces (stiction check), and withdraw it"
             )
     return None
+
+
+def _below_zero(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
+    """That no friction is as low as the law's at v and f_n, of a law that is plausible within its data."""
+    friction = float(_interval(model, tangential_velocity, normal_force)[0])
+    if friction > 0.0:
+        return None
+    where = f"at {tangential_velocity:.4g} m/s and {normal_force:.4g} N an element"
+    return (
+        f"friction comes out at {friction:.3g} {where}, too far outside of the data for the law: record a grasp there"
+    )
+
+
+def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:
+    """``uncertainty`` where the law may bend, too."""
+    expected, half = map(float, _interval(model, tangential_velocity, normal_force))
+    return math.hypot(half, 1.96 * float(widening(model, tangential_velocity, normal_force))) / expected
 
 
 def _ignorance(part: float) -> str:

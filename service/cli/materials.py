@@ -115,7 +115,8 @@ def _row(material: "Material") -> list[str | None]:
         return [name, logs, None, None, None, made]
     middle = 0.5 * sum(model.domain.normal_force)
     expected = float(model.predict(0.0, middle))
-    return [name, logs, number(expected), model.method, model.support_at(0.0, middle).kind, made]
+    friction = number(expected) if expected > 0.0 else None
+    return [name, logs, friction, model.method, model.support_at(0.0, middle).kind, made]
 
 
 def _support(material: "Material") -> str | None:

@@ -28,7 +28,7 @@ from service.cli.options import (
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted
 from service.cli.sources import Source, found
-from service.formatting import at_least, number
+from service.formatting import at_least, further_warning, number
 
 if TYPE_CHECKING:
     from stiction_client import FrictionAnswer, FrictionClient, FrictionModel, NextGrasp, RequiredForce
@@ -286,21 +286,24 @@ def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
     friction = number(answer.friction_coefficient)
     area = "" if answer.element_area is None else f" of {number(1e6 * answer.element_area)} mm²"
     if answer.quantile is not None:
-        friction += f", the {answer.quantile:g} quantile {whose}; the mean is {number(answer.mean)}"
+        friction += f", the {answer.quantile:g} quantile {whose}"
+        friction += f"; the mean is {number(answer.mean)}" if answer.mean > 0.0 else ""
     return [
         ("μ", friction),
         ("at", f"{number(answer.tangential_velocity)} m/s and {number(answer.normal_force)} N an element{area}"),
         ("model", f"{answer.method}, version {answer.version}"),
         ("because", answer.chosen_because),
-        ("warning", answer.warning),
-        ("support", answer.support and _support(answer.support, answer.advice, answer.warning)),
+        *_support(answer.support, answer.advice, answer.warning),
         *(("note", note) for note in answer.notes),
     ]
 
 
-def _support(support: str, advice: str | None, warning: str | None) -> str:
-    """How far data support an answer, with the advice where the warning has not given it."""
-    return support if advice is None or advice in (warning or "") else f"{support}: {advice}"
+def _support(support: str | None, advice: str | None, warning: str | None) -> list[tuple[str, str | None]]:
+    """How far data support an answer, with the advice, and what the warning says beyond that; no support of a service
+    of before 0.1.
+    """
+    told = support if advice is None else f"{support}: {advice}"
+    return [("support", told), ("warning", further_warning(warning, advice or "") or None)]
 
 
 def _probe_lines(grasp: "NextGrasp") -> list[tuple[str, str | None]]:
@@ -325,7 +328,6 @@ def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str
         ("largest load", f"{number(grip.largest_load)} N" if isfinite(grip.largest_load) else None),
         ("μ", f"{number(grip.friction_coefficient)}, so low in {whose} at {number(grip.element_force)} N an element"),
         ("model", f"{model.method}, version {model.version}"),
-        ("warning", grip.warning),
-        ("support", _support(grip.support, grip.advice, grip.warning)),
+        *_support(grip.support, grip.advice, grip.warning),
         *(("note", note) for note in grip.notes),
     ]

@@ -3,11 +3,16 @@
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from service.formatting import interval, number
 from service.report.page import Fact, Table
 from slipcore.finding import severity_of
 from stiction_client.linear_friction import LinearFriction
 from stiction_client.support import Support
+
+FloatArray = NDArray[np.float64]
 
 COEFFICIENTS = (
     ("β₀", "friction at rest and without load", "no unit"),
@@ -65,12 +70,20 @@ def record_next(probe: Probe) -> str:
     )
 
 
+def expected_friction(model: LinearFriction, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
+    """The law's mean as a line or plane is drawn: 0 where it falls below, far outside of the data."""
+    return np.maximum(model.predict(tangential_velocity, normal_force), 0.0)
+
+
 def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
     """Friction of an element at rest, in the middle of the normal forces observed, and what that rests on."""
     force = 0.5 * sum(model.domain.normal_force)
     band = [float(model.predict(0.0, force, quantile=level)) for level in LEVELS]
     facts = [
-        Fact(f"Friction coefficient μ, at {number(force)} N an element", number(float(model.predict(0.0, force)))),
+        Fact(
+            f"Friction coefficient μ, at {number(force)} N an element",
+            number(float(model.predict(0.0, force))),
+        ),
         Fact("90 % of new observations", interval(band)),
     ]
     return facts, model.support_at(0.0, force)

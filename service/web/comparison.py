@@ -7,7 +7,7 @@ import numpy as np
 
 from db.records import StoredModel
 from service.domain.models.stored_results import to_friction_model
-from service.report.wording import LEVELS
+from service.report.wording import LEVELS, expected_friction
 from service.web.charts import Curve, ManyChart, draw_together
 from service.web.friction import POINTS, FrictionEstimate, friction_at
 
@@ -44,4 +44,4 @@ def _curve(stored: StoredModel, marked: float) -> Curve:
     f_n = np.linspace(*seen, POINTS)
     low, high = (model.predict(0.0, f_n, quantile=level).tolist() for level in LEVELS)
     labels = "normal force on an element, N", "friction coefficient μ", "Friction over normal force, at velocity 0"
-    return Curve(f_n.tolist(), model.predict(0.0, f_n).tolist(), low, high, seen, marked, *labels)
+    return Curve(f_n.tolist(), expected_friction(model, 0.0, f_n).tolist(), low, high, seen, marked, *labels)

@@ -10,7 +10,7 @@ from db.records import Material, StoredModel
 from service.domain.models.recommended import disagreeing, recommended
 from service.domain.models.stored_results import to_friction_model
 from service.domain.planning.record_next import RecordNext, record_next
-from service.report.wording import COEFFICIENTS, LEVELS
+from service.report.wording import COEFFICIENTS, LEVELS, expected_friction
 from service.web.charts import Chart, Curve, draw
 from stiction_client.support import OUTDATED, Support
 
@@ -23,7 +23,8 @@ BEYOND = 1.25
 
 @dataclass(frozen=True, slots=True)
 class FrictionEstimate:
-    """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval.
+    """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval; None
+    where the law falls below 0, far outside of the data, and nothing is known.
 
     ``disagreement`` with the material's models by other methods, where there is any; ``notes``: what else is to be
     known of the model.
@@ -31,8 +32,8 @@ class FrictionEstimate:
 
     tangential_velocity: float
     normal_force: float
-    mean: float
-    interval: tuple[float, float]
+    mean: float | None
+    interval: tuple[float, float] | None
     support: Support
     disagreement: str | None = None
     notes: tuple[str, ...] = ()
@@ -66,7 +67,8 @@ def friction_at(
     low, high = (float(model.predict(v, f_n, quantile=level)) for level in LEVELS)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
     mean, apart = float(model.predict(v, f_n)), disagreeing(stored, others)
-    return FrictionEstimate(v, f_n, mean, (low, high), support, apart, model.notes)
+    shown, interval = (mean, (low, high)) if mean > 0.0 else (None, None)
+    return FrictionEstimate(v, f_n, shown, interval, support, apart, model.notes)
 
 
 def next_of(stored: StoredModel, at: FrictionEstimate) -> RecordNext | None:
@@ -146,6 +148,6 @@ class _Section:
 def _chart(stored: StoredModel, along: _Section, v: ArrayLike, f_n: ArrayLike, title: str) -> Chart:
     model = to_friction_model(stored.model)
     low, high = (model.predict(v, f_n, quantile=level).tolist() for level in LEVELS)
-    mean = model.predict(v, f_n).tolist()
+    mean = expected_friction(model, v, f_n).tolist()
     x = along.x.tolist()
     return draw(Curve(x, mean, low, high, along.seen, along.marked, along.label, "friction coefficient μ", title))

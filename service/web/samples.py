@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from db.records import NewModel
 from service.domain.models.stored_results import decode_samples, to_friction_model
 from service.packed_arrays import pack_arrays
-from service.report.wording import LEVELS
+from service.report.wording import LEVELS, expected_friction
 from slipcore.samples import FrictionSamples
 
 FloatArray = NDArray[np.float64]
@@ -76,7 +76,8 @@ def _surface(model: NewModel, velocity: FloatArray, force: FloatArray) -> dict[s
     """The model and its band on a lattice [v, f_n] from 0 to the largest of the samples."""
     fitted = to_friction_model(model)
     v, f_n = (np.linspace(0.0, float(values.max()), LATTICE) for values in (velocity, force))
-    mean, low, high = (fitted.predict(v[:, None], f_n, level).ravel() for level in (None, *LEVELS))
+    low, high = (fitted.predict(v[:, None], f_n, level).ravel() for level in LEVELS)
+    mean = expected_friction(fitted, v[:, None], f_n).ravel()
     return {"lattice_velocity": v, "lattice_force": f_n, "mean": mean, "low": low, "high": high}
 
 

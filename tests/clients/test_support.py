@@ -36,6 +36,11 @@ def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
         (known, 0.0, 0.6): ("extrapolated", "normal force extrapolated to 0.6 N an element, observed 0.002 to 0.3"),
         (known, 0.01, 0.1): ("extrapolated", "tangential velocity extrapolated to 0.01 m/s"),
         (make_model((0.4, 0.0, 0.0), np.diag([1e-3, 0, 0])), 0.0, 0.1): ("not identified", "± 17% only: record more"),
+        (make_model((0.4, 0.0, -1.0), EXACT), 0.0, 0.5): (
+            "implausible",
+            "comes out at -0.1 at 0 m/s and 0.5 N an element",
+        ),
+        (make_model((0.4, 0.0, -1.0), EXACT), 0.0, 0.39): ("extrapolated", "observed 0.002 to 0.3"),
         (replace(known, identifiable=np.zeros(3, bool)), 0.0, 0.1): ("not identified", "no coefficient is known"),
         (replace(known, outdated=True), 0.0, 0.1): ("stale", "ask for a fit"),
         (replace(known, current=False), 0.0, 0.1): ("stale", "fetch the current model"),
@@ -51,6 +56,15 @@ def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
         assert found.kind == kind
         assert advice in found.advice
         assert kinds(model, v, f_n, model.stale) == kind
+
+
+def test_an_extrapolation_says_how_well_friction_is_known_there(make_model: Make) -> None:
+    """At twice the largest force of the data a law without error may bend by a tenth: 1.96 of these are told."""
+    told = make_model((0.4, 0.0, 0.0), 0.0 * EXACT).support_at(0.0, 0.6).advice
+    assert told.endswith("; the expected friction is known to within ± 20% there: record a grasp there")
+    uncertain = make_model((0.4, 0.0, 0.0), np.diag([0.0, 9.0, 0.0]))
+    slope, bend = 3.0 * special.stdtrit(uncertain.degrees_of_freedom, 0.975), 1.96 * BEND * np.log(0.4 / 4e-3)
+    assert f"known to within ± {np.hypot(slope, bend):.0%} there" in uncertain.support_at(0.4, 0.1).advice
 
 
 def test_velocities_that_nobody_knows_are_no_support(make_model: Make) -> None:

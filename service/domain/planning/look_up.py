@@ -31,9 +31,9 @@ class FrictionQuery:
 class Friction(NamedTuple):
     """Friction coefficient of a material at a tangential velocity m/s and a normal force N of an element of an area m².
 
-    ``friction_coefficient``: the quantile that was asked for, or the mean, at least 0; ``within_domain``: the samples
-    reach there; ``support`` and ``advice``: what the answer rests on, and what to do about it;
-    ``notes``: what else is to be known of the model.
+    ``friction_coefficient``: the quantile that was asked for, or the mean, at least 0; ``mean``: of the linear law,
+    which may fall below 0 far outside of the data; ``within_domain``: the samples reach there; ``support`` and
+    ``advice``: what the answer rests on, and what to do about it; ``notes``: what else is to be known of the model.
     """
 
     material: str
@@ -70,7 +70,8 @@ def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
     outside = model.extrapolation(v, f_n)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
     outdated = f"the model is outdated: {OUTDATED}" if stored.outdated and support.kind != "stale" else None
-    nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
+    is_unknown = asked <= 0.0 < mean  # of a mean that is not above 0 either, support speaks
+    nothing = "the answer is not above 0: nothing is known of the friction there" if is_unknown else None
     return Friction(
         material=stored.material,
         method=stored.model.method,

@@ -304,8 +304,13 @@ class FrictionOut(BaseModel):
     quantile: float | None
     of: Annotated[Averaged, Field(description="Whose friction the quantile is of")] = "element"
     elements: Annotated[int, Field(description="Over how many elements its scatter averages out")] = 1
-    friction_coefficient: Annotated[float, Field(description="The quantile that was asked for; without one, the mean")]
-    mean: float
+    friction_coefficient: Annotated[
+        float, Field(description="The quantile that was asked for; without one, the mean, or 0")
+    ]
+    mean: Annotated[
+        float,
+        Field(description="Of the linear law, which falls below 0, where no friction is, far outside of the data"),
+    ]
     within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]
     warning: str | None
     support: SupportKind

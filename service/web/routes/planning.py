@@ -6,6 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from estimators.method_names import PLANNING_METHODS
 from service.domain.planning import plan
+from service.formatting import further_warning
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute
@@ -36,9 +37,3 @@ def show_plan(context: CurrentContext, request: Request) -> Response:
     answer = plan.grasp_force(context, task)
     given |= {"answer": answer, "further": further_warning(answer.warning, answer.advice)}
     return render(request, "plan.html", **given, problem=None)
-
-
-def further_warning(warning: str | None, advice: str) -> str:
-    """What a warning says beyond the advice that stands above it, part of which or all of which it may be."""
-    rest = (warning or "").replace(advice, "")
-    return "; ".join(part for part in rest.split("; ") if part and part not in advice)

@@ -40,7 +40,7 @@ function draw() {
 }
 
 const column = (name) => seen.map((frame) => frame[name] ?? NaN);
-const ofFriction = (name) => seen.map((frame) => frame.friction?.[name] ?? NaN);
+const ofFriction = (name) => seen.map((frame) => Math.max(frame.friction?.[name] ?? NaN, 0)); // a line's mean may fall below
 const most = (...columns) => roundUp(Math.max(...columns.flat().filter((value) => !Number.isNaN(value)), 0));
 
 function drawTimes() {
@@ -74,7 +74,7 @@ function tell(frame) {
   const facts = {
     time: `${frame.time.toFixed(2)} s, frame ${frame.number}`,
     stick_ratio: frame.stick_ratio === null ? "no contact" : three(frame.stick_ratio) + (frame.macro_slip ? ", gross slip" : ""),
-    friction: friction === null ? "no samples yet" : `${three(friction.mean)} (${three(friction.low)} to ${three(friction.high)})`,
+    friction: friction === null ? "no samples yet" : `${three(Math.max(friction.mean, 0))} (${three(friction.low)} to ${three(friction.high)})`,
     normal_force: unit(frame.normal_force, "N"),
     tangential_force: unit(frame.tangential_force, "N"),
     command: unit(frame.command, "N"),

@@ -147,11 +147,24 @@ def test_what_is_looked_up_is_told_with_all_that_was_said_of_it(client: Mock, sa
         "at 0.00100 m/s and 0.0700 N an element of 1.00 mm²",
         "model ols, version 3",
         "because it is the best",
-        "warning careful",
         "support supported: record more",
+        "warning careful",
         "note a note",
         "note another",
     ]
+
+
+def test_what_is_said_of_support_is_not_said_again_as_a_warning_nor_a_friction_below_0(client: Mock, say: Say) -> None:
+    outside = "normal force extrapolated to 9 N an element"
+    client.friction.return_value = replace(
+        ANSWER, quantile=0.05, friction_coefficient=0.0, mean=-0.2, warning=f"{outside}; look at the samples",
+        support="extrapolated", advice=f"{outside}: record a grasp there",
+    )  # fmt: skip
+    told = say("lookup", "paper", "--normal-force", "9")
+    assert told.count(outside) == 1
+    assert "one element\n" in told
+    lines = [" ".join(line.split()) for line in told.splitlines()]
+    assert lines[-2:] == [f"support extrapolated: {outside}: record a grasp there", "warning look at the samples"]
 
 
 GRIP = RequiredForce(3.7501, (3.7501, 20.0), 16.25, 5.0, 0.04, 0.31, 1e-3, True, None, "contact", 90.4, advice="go on")

@@ -17,11 +17,11 @@ from starlette.formparsers import MultiPartParser
 
 from estimators.method_names import METHODS
 from service.domain.uploads import upload
+from service.formatting import further_warning
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
 from service.http.schemas.planning import NewGraspForce
 from service.web import forms
-from service.web.routes.planning import further_warning
 from slipcore import GraspLog
 from stiction_client import container
 from tests.service.web.conftest import HOSTILE, HTML, OWN

@@ -44,6 +44,19 @@ def test_the_answer_is_the_models(ask: Callable[..., Any], model: estimators.Fri
     assert (answer.within_domain, answer.warning, answer.version) == (True, None, 1)
 
 
+def test_no_friction_is_below_0_and_where_the_law_is_the_answer_says_that_it_cannot_be(
+    ask: Callable[..., Any], model: estimators.FrictionModel
+) -> None:
+    falling = replace(model, coefficients=np.array([0.5, 0.0, -2.0]))
+    far = 10.0 * falling.domain.normal_force[1]
+    for quantile in (None, 0.05):
+        answer = ask(falling, FrictionQuery(0.0, far, quantile))
+        assert answer.mean == float(falling.predict(0.0, far)) < 0.0 == answer.friction_coefficient
+        assert (answer.within_domain, answer.support) == (False, "implausible")
+        assert answer.warning == f"{falling.extrapolation(0.0, far)}; {answer.advice}"
+        assert f"comes out at {answer.mean:.3g}" in answer.advice
+
+
 def test_forces_may_be_those_of_an_element_of_another_area(
     ask: Callable[..., Any], model: estimators.FrictionModel
 ) -> None:
