@@ -143,10 +143,12 @@ class Followed(NamedTuple):
 
 
 def told(models: Sequence[FrictionModel], loads: Array, asked: float) -> Array:
-    """Smallest and largest forces [2, models, loads] that keep slip so rare; infinite where none does."""
+    """Smallest and largest forces [2, models, loads] that keep slip so rare; infinite where none does, as for a load of
+    0, which stands for one that who knows all cannot hold (``load_of``).
+    """
     found = [required_normal_force(model, loads, asked, **ASKED_OF).feasible_interval for model in models]
     forces = np.stack(found, axis=1)
-    return np.where(np.isnan(forces), np.inf, forces)
+    return np.where(np.isnan(forces) | (loads == 0.0), np.inf, forces)
 
 
 def kept(forces: Array, lenient: Array) -> Array:

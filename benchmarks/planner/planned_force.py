@@ -70,7 +70,11 @@ def slips(kind: Kind, load: float, force: float) -> float:
 
 
 def load_of(kind: Kind, force: float, asked: float) -> float:
-    """The load, N, that ``force`` N holds but for a probability ``asked``."""
+    """The load, N, that ``force`` N holds but for a probability ``asked``; 0 where grasps without friction are more
+    frequent, as with a normal factor of a large scale.
+    """
+    if slips(kind, 0.0, force) >= asked:
+        return 0.0
     return float(optimize.brentq(lambda load: slips(kind, load, force) - asked, 0.0, force * TRUTH[0]))
 
 

@@ -17,6 +17,7 @@ from benchmarks.planner.answers_kept import (
     kept,
     of_shapes,
     row,
+    told,
 )
 from benchmarks.planner.planned_force import ASKED, model_of
 from estimators import Moments, ScatterPrior
@@ -45,6 +46,10 @@ def test_an_answer_stays_while_the_lenient_rule_has_one_and_as_near_to_what_it_w
     high = np.where(np.isfinite(low), 8.0, NONE)
     expected = [[3.0, NONE, 3.0, 9.0], [3.0, 4.0, NONE, 8.0], [3.5, 2.0, 2.5, 8.0]]
     assert kept(forces, np.stack([low, high])).tolist() == expected
+
+
+def test_a_load_that_nobody_can_hold_has_no_answer(model: FrictionModel) -> None:
+    assert np.isinf(told([model], np.array([0.0, 0.5]), ASKED[0])).tolist() == [[[True, False]]] * 2
 
 
 def test_of_a_known_scale_a_log_normal_factor_has_its_quantile(model: FrictionModel) -> None:
@@ -80,9 +85,9 @@ def test_a_line_counts_answers_and_those_that_vanish() -> None:
     loads = np.array([0.5, 1.0])
     forces = np.full((20, 2), 4.0)
     forces[1, 0] = forces[6, :] = NONE
-    told = row(("normal", "default"), "0.05", [Followed(scatters(0.05), loads, forces)])
-    assert told[:4] == ["normal", "default", "0.05", "100.0 50.0 100.0"]
-    assert told[5:] == ["50.00 0.00 7.14", "8.57", "10.53"]
+    line = row(("normal", "default"), "0.05", [Followed(scatters(0.05), loads, forces)])
+    assert line[:4] == ["normal", "default", "0.05", "100.0 50.0 100.0"]
+    assert line[5:] == ["50.00 0.00 7.14", "8.57", "10.53"]
 
 
 def test_in_a_normal_world_a_log_normal_factor_lets_more_slip() -> None:

@@ -14,6 +14,13 @@ def test_who_knows_all_slips_as_often_as_asked() -> None:
         assert slips(kind, load_of(kind, 4.0, asked), 4.0) == pytest.approx(asked, rel=1e-6)
 
 
+def test_where_grasps_without_friction_are_more_frequent_than_asked_no_load_is_held() -> None:
+    """The factor 1 + 0.39 z is below 0 in 5 of 1000 grasps."""
+    kind = Kind(0.39, 0.02, 0.03, normal=True)
+    assert load_of(kind, 4.0, 1e-3) == 0.0
+    assert load_of(kind, 4.0, 1e-2) > 0.0
+
+
 def test_without_scatter_between_grasps_slip_is_normal() -> None:
     kind = Kind(0.0, 0.02, 0.03)
     mean = float(TRUTH @ [1.0, 0.0, 4.0 / CONTACT])
