@@ -17,6 +17,7 @@ from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
 from service.report.wording import findings_heading, record_next
 from service.web.assets import path_of
+from service.web.labels import label, labelled_detail, named
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
@@ -70,5 +71,6 @@ def _environment() -> Environment:
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
     environment.filters["with_code"] = with_code
     environment.filters["findings_heading"] = findings_heading
+    environment.filters |= {"label": label, "named": named, "labelled_detail": labelled_detail}
     environment.globals["asset"] = path_of
     return environment

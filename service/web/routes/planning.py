@@ -20,13 +20,17 @@ router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 FIELDS = frozenset(NewGraspForce.model_fields)
 
+ALWAYS_SHOWN = {"material", "tangential_load", "contact_area", "fingers", "torque", "slip_probability"}
+"""Fields of the form; the others are folded away until one of them is asked for."""
+
 
 @router.get("/plan", dependencies=[READ])
 def show_plan(context: CurrentContext, request: Request) -> Response:
     """The form, what it was last asked, and forces for other probabilities of slip; raises as the API's route does."""
     fields = {name: text for name, text in request.query_params.items() if name in FIELDS}
     given: dict[str, Any] = {"fields": fields, "names": names(context), "methods": PLANNING_METHODS}
-    given |= {"answer": None, "chart": None}
+    more = {fields[name] for name in fields.keys() - ALWAYS_SHOWN} - {"", "auto"}
+    given |= {"answer": None, "chart": None, "more": bool(more)}
     on_problem(request, "plan.html", **given)
     if not fields.get("tangential_load"):
         return render(request, "plan.html", **given, problem=None)

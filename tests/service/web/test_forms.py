@@ -59,11 +59,11 @@ def test_the_form_shows_a_mapping_that_can_be_used(client: httpx.Client) -> None
     [
         ({}, b"no log at all", "The format is not supported"),
         ({"format": "application/vnd.stiction.grasp-log+npz"}, b"no log at all", "The grasp log is not valid"),
-        ({}, b"", "file is missing or empty"),
+        ({}, b"", "“File” is missing or empty"),
         ({"material": "nobody knows it"}, b"x", "No such material"),
-        ({"material": "<b>", "create": "true"}, b"x", "name is &lt;b&gt;"),
-        ({"scale": "-1"}, b"x", "scale is -1"),
-        ({"detector": "magic"}, b"x", "detector is magic"),
+        ({"material": "<b>", "create": "true"}, b"x", "“Name of the material” is &lt;b&gt;"),
+        ({"scale": "-1"}, b"x", "“Scale of tracked markers, m per pixel” is -1"),
+        ({"detector": "magic"}, b"x", "“Detector of slip” is magic"),
         ({"matreial": "paper"}, b"x", "matreial"),
         ({}, b"x" * (4 * 2**20), "The body is too large"),
     ],
@@ -202,6 +202,21 @@ def test_the_calculator_asks_for_the_recommended_model_unless_told_otherwise(bro
     assert [method for method in METHODS if f">{method}</option>" not in form] == ["conjugate"]
     assert re.findall("<option selected>(.*?)</option>", form)[-1:] == ["auto"]
     assert "<option selected>robust</option>" in browser.get("/plan?method=robust").text
+    unlisted = browser.get("/plan?method=conjugate").text
+    assert re.findall("<option[^>]* selected>(.*?)</option>", unlisted)[-1:] == ["conjugate, which is not for planning"]
+    assert "<option selected>auto</option>" not in unlisted
+
+
+@ON_SQLITE
+def test_the_calculator_shows_all_that_it_was_asked(browser: Any, elements: Any) -> None:
+    asked = dict.fromkeys(NewGraspForce.model_fields, "1") | {"method": "ols", "of": "element", "sensor": "left"}
+    found = elements(browser.get("/plan", params=asked | {"tangential_load": ""}).text).found
+    assert {given["name"] for tag, given in found if tag in {"input", "select"}} >= asked.keys()
+    shown = {given.get("value") for tag, given in found if tag == "input"}
+    assert shown == {"", "1", "left"}
+    assert [given for tag, given in found if tag == "details"] == [{"open": None}]
+    folded = elements(browser.get("/plan?material=paper&method=auto&torque=1").text).found
+    assert [given for tag, given in folded if tag == "details"] == [{}]
 
 
 @ON_SQLITE
@@ -224,8 +239,12 @@ def test_the_calculator_draws_the_forces_of_all_probabilities(
 @pytest.mark.parametrize(
     ("query", "status", "told"),
     [
-        ("material=fitted&tangential_load=x&contact_area=6e-5", 422, "tangential_load is x"),
-        ("material=fitted&tangential_load=1&contact_area=", 422, "contact_area is missing"),
+        (
+            "material=fitted&tangential_load=x&contact_area=6e-5",
+            422,
+            "“Load of all fingers together, N” is x; allowed:",
+        ),
+        ("material=fitted&tangential_load=1&contact_area=", 422, "“Contact area of one finger, m²” is missing"),
         ("material=nobody&tangential_load=1&contact_area=6e-5", 404, "No such material"),
         ("material=never+held&tangential_load=1&contact_area=6e-5", 409, "no fitted model yet"),
         ("material=fitted&tangential_load=9&contact_area=6e-5&normal_force_limit=0.1", 409, "No normal force holds"),

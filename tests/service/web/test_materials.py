@@ -124,8 +124,8 @@ def test_a_form_makes_a_material_known_and_leads_to_it(browser: Any) -> None:
 @pytest.mark.parametrize(
     ("data", "told"),
     [
-        ({"name": "<b>"}, "name is &lt;b&gt;"),
-        ({}, "name is missing"),
+        ({"name": "<b>"}, "“Name of the material” is &lt;b&gt;"),
+        ({}, "“Name of the material” is missing"),
         ({"name": "paper"}, "The material exists already"),
     ],
 )

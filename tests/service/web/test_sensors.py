@@ -94,9 +94,9 @@ def test_only_admins_change_a_gel(session_of: Any, database: Database, sensor: s
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"young_modulus": ""}, "young_modulus is missing"),
-        ({"poisson_ratio": "0.6"}, "poisson_ratio is 0.6"),
-        ({"young_modulus": "<b>"}, "young_modulus is &lt;b&gt;"),
+        ({"young_modulus": ""}, "“Young&#39;s modulus, Pa” is missing"),
+        ({"poisson_ratio": "0.6"}, "“Poisson&#39;s ratio” is 0.6"),
+        ({"young_modulus": "<b>"}, "“Young&#39;s modulus, Pa” is &lt;b&gt;"),
         ({"thickness": "1e-4"}, "marker_depth below the thickness"),
     ],
 )
