@@ -146,6 +146,8 @@ CLIENT_OTHER = {
     "contacts.py": "permitted ranges, and means of Hertz's pressure",
     "controller/settings.py": "the gains, each with its range, unit and reason",
     "defaults.py": "the table",
+    "controller/records.py": "permitted ranges",
+    "holding.py": "from how many entries on arrays shrink, and what is next to 0, which change no answer",
     "model.py": "the file format's name and version",
     "json_values.py": "rounding that a model may have when it is read, which changes no answer",
     "planner.py": "permitted ranges, and the default bound, an argument of the call",

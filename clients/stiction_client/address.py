@@ -5,6 +5,7 @@ from contextlib import contextmanager
 
 import httpx
 
+from stiction_client.arguments import of_kind
 from stiction_client.errors import InvalidArgument
 
 DEFAULT_URL = "http://127.0.0.1:8000"
@@ -17,6 +18,7 @@ MOST_PORT = 65535
 
 def service_address(url: str) -> httpx.URL:
     """The address of a service in its parts; raises ``InvalidArgument`` for one that no service can have."""
+    of_kind("address", url, str)
     with checked(url):
         address = httpx.URL(url)
     if address.scheme not in ("http", "https"):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from types import UnionType
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
             return number
         raise InvalidArgument(name, value, _range(low, high, unit))
     array = np.asarray(value)
-    if array.dtype.kind not in "iuf":
+    if array.dtype.kind not in "iuf" or _holds_truth(value) or np.ma.is_masked(value):
         raise InvalidArgument(name, shown(value), f"numbers: {_range(low, high, unit)}")
     numbers = array.astype(np.float64)
     wrong = ~((low <= numbers) & (numbers <= high))
@@ -27,18 +28,40 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
     return numbers if numbers.ndim else float(numbers)
 
 
+def number(name: str, value: object, low: float, high: float, unit: str = "") -> float:
+    """One number in [low, high]; raises ``InvalidArgument`` for anything else, an array among it."""
+    one = within(name, value, low, high, unit)
+    if not isinstance(one, float):
+        raise InvalidArgument(name, shown(value), f"one number: {_range(low, high, unit)}")
+    return one
+
+
 def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
     """One whole number in [low, high]; raises ``InvalidArgument`` for anything else."""
-    number = within(name, value, low, high, unit)
-    if not isinstance(number, float) or not number.is_integer():
+    found = within(name, value, low, high, unit)
+    if not isinstance(found, float) or not found.is_integer():
         raise InvalidArgument(name, shown(value), f"a whole number: {_range(low, high, unit)}")
-    return int(number)
+    return int(found)
 
 
-def of_kind(name: str, value: object, kind: type) -> None:
+def of_one_shape(**given: object) -> None:
+    """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
+    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, float | int | None)}  # type: ignore[call-overload]
+    if not shapes:
+        return
+    try:
+        np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        sized = {name: str(list(shape)) for name, shape in shapes.items() if shape}
+        allowed = "one length, or any shapes that broadcast"
+        raise InvalidArgument(" and ".join(sized), " and ".join(sized.values()), allowed) from None
+
+
+def of_kind(name: str, value: object, kind: type | UnionType) -> None:
     """Raises ``InvalidArgument`` for a value that is no ``kind``."""
     if not isinstance(value, kind):
-        raise InvalidArgument(name, shown(value), f"an object of {kind.__name__}")
+        kinds = " or ".join(each.__name__ for each in (kind.__args__ if isinstance(kind, UnionType) else (kind,)))
+        raise InvalidArgument(name, shown(value), f"an object of {kinds}")
 
 
 def number_of_items(limit: object) -> float:
@@ -65,6 +88,13 @@ def for_json(name: str, value: object) -> Any:
     if value is None or isinstance(value, str | int | float):
         return value
     raise InvalidArgument(name, shown(value), "numbers, text, and lists and objects of these")
+
+
+def _holds_truth(value: object) -> bool:
+    """Whether a list has ``True`` or ``False`` among its numbers, which NumPy takes for 1 and 0."""
+    if not isinstance(value, list | tuple):
+        return False
+    return any(_holds_truth(each) or isinstance(each, bool | np.bool_) for each in value)
 
 
 def _range(low: float, high: float, unit: str) -> str:

@@ -255,6 +255,9 @@ Names = set[tuple[str, str]]
 
 def friction(name: str, question: Mapping[str, float | str | None], known: Names) -> Call[FrictionAnswer]:
     """Look friction up."""
+    for each in ("v", "fn"):
+        if question[each] is None:
+            raise InvalidArgument(each, None, "a number")
     asked = without_none(**question)
     answer = read_as(FrictionAnswer.from_json, (yield from get(f"/v1/materials/{segment(name)}/friction", asked)))
     echoed = {ECHOED[each]: value for each, value in asked.items() if each in ECHOED}

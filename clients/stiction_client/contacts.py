@@ -5,12 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiction_client.arguments import whole, within
+from stiction_client.arguments import number, of_kind, of_one_shape, whole, within
 from stiction_client.elementwise import Number
 from stiction_client.errors import InvalidArgument
 
 AREAS = (1e-12, 1.0)
 """m² that a contact of a gripper may have."""
+
+FORCES = (1e-9, 1e9, "N")
+"""Under which it may have that area."""
+
+LEVER_ARMS = (1e-6, 1e3, "m")
+"""From the axis of an object to the fingers around it."""
+
+PRESSURE_SQUARES = (0.999999, 1e12)
+"""Mean of the squared pressure over the square of its mean: 1 of uniform pressure, but for rounding."""
 
 UNIFORM_TORSION, HERTZ_TORSION = 2.0 / 3.0, 3.0 * math.pi / 16.0
 """Friction moment of a contact over μ F_N a (a: contact radius), under uniform pressure and under Hertz's
@@ -34,6 +43,14 @@ class Contact:
     pressure_square: Number = 1.0
     torque_arm: Number = 0.0
 
+    def __post_init__(self) -> None:
+        within("area", self.area, *AREAS, "m²")
+        if self.reference_force is not None:
+            number("reference_force", self.reference_force, *FORCES)
+        within("pressure_square", self.pressure_square, *PRESSURE_SQUARES)
+        within("torque_arm", self.torque_arm, 0.0, 10.0, "m")
+        of_one_shape(area=self.area, pressure_square=self.pressure_square, torque_arm=self.torque_arm)
+
     @classmethod
     def flat(cls, area: Number) -> "Contact":
         """A disk of ``area`` m² under uniform pressure, at any force."""
@@ -43,7 +60,7 @@ class Contact:
     @classmethod
     def round(cls, area: Number, at_force: float) -> "Contact":
         """A round fingertip: its contact has ``area`` m² under ``at_force`` N, and grows with force as Hertz's does."""
-        area, force = within("area", area, *AREAS, "m²"), float(within("at_force", at_force, 1e-9, 1e9, "N"))
+        area, force = within("area", area, *AREAS, "m²"), number("at_force", at_force, *FORCES)
         return cls(area, force, HERTZ_SQUARE, HERTZ_TORSION * (area / math.pi) ** 0.5)
 
     @classmethod
@@ -57,8 +74,10 @@ class Contact:
         if any(place.shape != p.shape for place in places) or p.ndim != 1:
             sizes = " and ".join(str(list(each.shape)) for each in (p, *places))
             raise InvalidArgument("pressure, x and y", f"{sizes} numbers", "three rows of one length")
-        element = within("element_area", element_area, *AREAS, "m²")
-        force = within("total pressure", float(p.sum()), 1e-300, 1e300, "Pa, above 0")
+        element = number("element_area", element_area, *AREAS, "m²")
+        within("total pressure", float(p.sum()), 1e-300, 1e300, "Pa, above 0")
+        p = p / p.max()  # whose squares then cannot underflow
+        force = float(p.sum())
         radius = np.hypot(*(place - float(p @ place) / force for place in places))
         pressed = int((p > 0.0).sum())
         return cls(pressed * element, None, float(p @ p) * pressed / force**2, float(p @ radius) / force)
@@ -97,6 +116,12 @@ class Contacts:
     count: int = 1
     lever_arm: Number | None = None
 
+    def __post_init__(self) -> None:
+        of_kind("contact", self.contact, Contact)
+        whole("count", self.count, 1, 100, "contacts")
+        if self.lever_arm is not None:
+            within("lever_arm", self.lever_arm, *LEVER_ARMS)
+
 
 def grasp(area: float, round_at: float | None = None, fingers: int = 1, object_radius: float | None = None) -> Contacts:
     """Equal fingers by what they are on a form: flat, or round with ``area`` m² under ``round_at`` N.
@@ -106,7 +131,7 @@ def grasp(area: float, round_at: float | None = None, fingers: int = 1, object_r
     contact = Contact.flat(area) if round_at is None else Contact.round(area, round_at)
     if object_radius is not None:
         return n_fingers(fingers, contact, object_radius)
-    return Contacts(contact, int(within("fingers", fingers, 1, 100)))
+    return Contacts(contact, whole("fingers", fingers, 1, 100))
 
 
 def antipodal(contact: Contact) -> Contacts:
@@ -117,5 +142,5 @@ def antipodal(contact: Contact) -> Contacts:
 def n_fingers(count: int, contact: Contact, object_radius: Number) -> Contacts:
     """Fingers evenly around an object of ``object_radius`` m, such as a lid; a torque is about the object's axis."""
     return Contacts(
-        contact, whole("count", count, 1, 100, "fingers"), within("object_radius", object_radius, 1e-6, 1e3, "m")
+        contact, whole("count", count, 1, 100, "fingers"), within("object_radius", object_radius, *LEVER_ARMS)
     )

@@ -54,3 +54,8 @@ def anywhere(condition: Any) -> bool:
 def plain(value: Any) -> Number:
     """A float where it is one number, which computes ten times as fast as NumPy's."""
     return value if isinstance(value, np.ndarray) and value.ndim else float(value)
+
+
+def of_these(value: Number, where: NDArray[np.bool_]) -> Number:
+    """The entries of an array that broadcasts to the shape of ``where``, where that holds; a float as it is."""
+    return np.broadcast_to(value, where.shape)[where] if isinstance(value, np.ndarray) else value

@@ -3,9 +3,18 @@
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from stiction_client.defaults import ENDLESS, MOST_STEPS, ROUNDING
-from stiction_client.elementwise import Number, Truth, anywhere, greatest, hypot, least, select
+from stiction_client.elementwise import FloatArray, Number, Truth, anywhere, greatest, hypot, least, of_these, select
 from stiction_client.quantile import FrictionQuantile
+
+SMALLEST = 1e-300
+"""N; added to what may be 0 before it divides."""
+
+MANY = 1000
+"""Entries of arrays: once more than so many have their root, the others are taken out to be searched on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,18 +45,23 @@ class LoadedContact:
         """Normal force of the contact, N."""
         return x if self.power == 1 else x * x * x
 
+    def only(self, where: NDArray[np.bool_]) -> "LoadedContact":
+        """The contacts of these entries."""
+        load, moment, unit = (of_these(each, where) for each in (self.load, self.moment, self.unit))
+        return LoadedContact(self.quantile.only(where), load, moment, unit, self.power)
+
     def expected(self) -> "LoadedContact":
         """The same contact, were friction its mean and nothing about it uncertain."""
         return replace(self, quantile=self.quantile.expected())
 
     def lowest(self, most: Number) -> tuple[Number, Truth]:
         """The least x that holds, and whether there is one up to ``most``."""
-        return self._lowest(self.quantile.asymptote, most)
+        return self._lowest(self.quantile.asymptote, most, 0.0)
 
-    def interval(self, most: Number) -> tuple[Number, Number, Truth]:
-        """The least x that holds, the greatest up to ``most``, and whether there are such."""
+    def interval(self, most: Number, above: Number = 0.0) -> tuple[Number, Number, Truth]:
+        """The least x that holds, the greatest up to ``most``, and whether there are such; none is below ``above``."""
         line = self.quantile.asymptote
-        low, holds = self._lowest(line, most)
+        low, holds = self._lowest(line, most, above)
         high = end = self._end(line, most)
         bounded = (end > 0.0) & (end < math.inf)
         if anywhere(bounded):
@@ -72,10 +86,10 @@ class LoadedContact:
         """
         return float(self.force(x) * self.quantile(self.unit * x)[0] * (load / (self._load(x)[0] or 1.0)))
 
-    def _lowest(self, line: tuple[Number, Number], most: Number) -> tuple[Number, Truth]:
-        """As ``lowest``, with the ``line`` above friction."""
+    def _lowest(self, line: tuple[Number, Number], most: Number, above: Number) -> tuple[Number, Truth]:
+        """As ``lowest``, with the ``line`` above friction, and an x that is ``above`` none that holds."""
         loaded = (self.load > 0.0) | (self.moment > 0.0)
-        low, found = self._search(select(loaded, self._start(line), 1.0), 1)
+        low, found = self._search(select(loaded, greatest(self._start(line), above), 1.0), 1)
         low = select(loaded, low, 0.0)
         return low, (found | (low == 0.0)) & (low <= most * (1.0 + ROUNDING))
 
@@ -119,17 +133,31 @@ class LoadedContact:
             if not anywhere(moving):
                 break
             x = x + select(moving, step, 0.0)
+            if isinstance(moving, np.ndarray) and moving.size > MANY + 2 * np.count_nonzero(moving):
+                ends = (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
+                return self._searched_on(x, ends, moving, direction)
             value, slope = self.surplus(x)
         return x, (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
 
+    def _searched_on(
+        self, x: Number, ends: Truth, moving: NDArray[np.bool_], direction: int
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """What ``_search`` gives, of entries that have their ``ends`` but for those that are ``moving``."""
+        found = np.broadcast_to(x, moving.shape).copy(), np.broadcast_to(ends, moving.shape).copy()
+        found[0][moving], found[1][moving] = self.only(moving)._search(found[0][moving], direction)
+        return found
+
     def _start(self, line: tuple[Number, Number]) -> Number:
         """An x that is no greater than the least that holds: where friction, if it were on that line, would."""
-        height, slope = (0.5 / (greatest(part, 0.0) + 1e-300) for part in line)
-        starts = [
-            least((load * height) ** (1.0 / power), (load * slope / self.unit) ** (1.0 / (power + 1)))
-            for load, power in ((self.load, self.power), (self.moment, 1 if self.power == 1 else 4))
-        ]
-        return greatest(*starts)
+        height, slope = line
+        rises = slope > 0.0  # then each of its two parts bears half at least, and else the first bears all
+        height = select(rises, 0.5, 1.0) / (greatest(height, 0.0) + SMALLEST)
+        slope = 0.5 / (greatest(slope, 0.0) + SMALLEST) / self.unit
+        loads = ((self.load, 3), (self.moment, 4)) if self.power == 3 else ((hypot(self.load, self.moment), 1),)
+        start: Number = SMALLEST ** (1.0 / self.power)  # below it a force has no digits
+        for load, power in loads:
+            start = greatest(start, least((load * height) ** (1.0 / power), (load * slope) ** (1.0 / (power + 1))))
+        return start
 
     def _growth(self, x: float) -> tuple[float, float]:
         """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""

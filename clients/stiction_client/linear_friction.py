@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
+from stiction_client.arguments import shown
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import UNKNOWN_SENSOR, Domain, Kind, Support, extrapolation, notes, support, widening
@@ -390,6 +391,12 @@ class LinearFriction:
         if elements is None or not 1.0 <= elements < math.inf:
             raise self.refusal("elements", elements, "the number of elements of the contact, at least 1")
         return float(elements)
+
+
+def check_model(model: object) -> None:
+    """Raises ``InvalidArgument`` for what is no fitted model."""
+    if not isinstance(model, LinearFriction):
+        raise InvalidArgument("model", shown(model), "a FrictionModel, as FrictionClient.model(name) gives it")
 
 
 def degrees_to_json(value: float) -> float | None:

@@ -10,12 +10,12 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_client.arguments import shown, within
+from stiction_client.arguments import of_one_shape, shown, within
 from stiction_client.contacts import AREAS, Contact, Contacts
-from stiction_client.elementwise import FloatArray, Number, anywhere, hypot, least, select
+from stiction_client.elementwise import FloatArray, Number, anywhere, hypot, least, of_these, select
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact
-from stiction_client.linear_friction import KINDS, LinearFriction
+from stiction_client.linear_friction import KINDS, check_model
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 from stiction_client.support import Kind, kinds
@@ -155,13 +155,13 @@ def required_normal_force(
     Any argument but the model may be an array; all broadcast, and the answer is then ``RequiredForces``. For one
     grasp, raises ``NoFeasibleForce`` where no force holds. Raises ``InvalidArgument`` for an argument that cannot be.
     """
-    if not isinstance(model, LinearFriction):
-        raise InvalidArgument("model", shown(model), "a FrictionModel, as FrictionClient.model(name) gives it")
+    check_model(model)
     together = _contacts(contact_area, contacts)
-    _check_shapes(
+    of_one_shape(
         tangential_load=tangential_load,
         slip_probability=slip_probability,
         contact_area=together.contact.area,
+        object_radius=together.lever_arm,
         torque=torque,
         tangential_velocity=tangential_velocity,
         safety_factor=safety_factor,
@@ -176,14 +176,17 @@ def required_normal_force(
         limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
     unit = together.contact.element_force(1.0, model.element_area)
 
-    def asked(probability: Number) -> _Question:
-        def loaded_with(count: Number) -> LoadedContact:
-            quantile = FrictionQuantile.of(model, velocity, probability, count)
-            return LoadedContact(quantile, load, moment, unit, together.contact.power)
+    kind, mean_unit = _kind(model, of), unit / together.contact.pressure_square
 
-        kind = _kind(model, of)
-        count = _averaged(kind, elements, together.contact, model.element_area, loaded_with)
-        return _Question(model, together, velocity, probability, limit, loaded_with(count), kind, count)
+    def asked(probability: Number) -> _Question:
+        quantile = FrictionQuantile.over(model, velocity, probability)
+
+        def loaded_with(count: Number) -> LoadedContact:
+            return LoadedContact(quantile(count), load, moment, unit, together.contact.power)
+
+        count, above = _averaged(kind, elements, together.contact, model.element_area, loaded_with)
+        loaded = loaded_with(count)
+        return _Question(model, together.count, velocity, probability, limit, loaded, mean_unit, kind, count, above)
 
     question = asked(probability)
     given = (load, moment, question.loaded.unit, velocity, probability, limit, question.elements)
@@ -194,39 +197,37 @@ def required_normal_force(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Question:
-    """What was asked, with the contact's share of the load."""
+    """What was asked, with the contact's share of the load; ``mean_unit``·x is the mean normal force of its elements,
+    N, and no x below ``above`` holds.
+    """
 
     model: FrictionModel
-    contacts: Contacts
+    contacts: int
     velocity: Number
     probability: Number
     limit: Number
     loaded: LoadedContact
+    mean_unit: Number
     of: str
     elements: Number
+    above: Number
 
     def element_force(self, x: Number) -> Number:
         """Mean normal force of the contact's elements, N."""
-        return self.loaded.unit * x / self.contacts.contact.pressure_square
+        return self.mean_unit * x
 
-
-def _check_shapes(**given: Number | None) -> None:
-    """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
-    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, float | int | None)}
-    try:
-        np.broadcast_shapes(*shapes.values())
-    except ValueError:
-        sized = {name: str(list(shape)) for name, shape in shapes.items() if shape}
-        allowed = "one length, or any shapes that broadcast"
-        raise InvalidArgument(" and ".join(sized), " and ".join(sized.values()), allowed) from None
+    def only(self, where: NDArray[np.bool_]) -> "_Question":
+        """What of these entries says why no force holds."""
+        limit, mean_unit = of_these(self.limit, where), of_these(self.mean_unit, where)
+        return replace(self, limit=limit, loaded=self.loaded.only(where), mean_unit=mean_unit)
 
 
 def _kind(model: FrictionModel, of: str | None) -> str:
     """Whose friction is meant."""
     if of is None:
         return "element" if model.scales is None else "contact"
-    if of not in KINDS:
-        raise InvalidArgument("of", of, " or ".join(KINDS))
+    if not isinstance(of, str) or of not in KINDS:
+        raise InvalidArgument("of", shown(of), " or ".join(KINDS))
     return of
 
 
@@ -236,8 +237,8 @@ def _averaged(
     contact: Contact,
     element_area: float,
     loaded_with: Callable[[Number], LoadedContact],
-) -> Number:
-    """Over how many elements scatter averages out.
+) -> tuple[Number, Number]:
+    """Over how many elements scatter averages out, and an x above none that holds.
 
     A round contact has the more of them the harder it is pressed: they are counted under the force that would hold if
     scatter averaged out wholly, which is less than any that does hold.
@@ -245,24 +246,30 @@ def _averaged(
     if elements is not None:
         elements = within("elements", elements, *COUNTS)
     if kind == "element":
-        return 1.0
+        return 1.0, 0.0
     if elements is not None:
-        return elements
+        return elements, 0.0
     force: Number = 1.0
+    above: Number = 0.0
     if contact.power > 1:
         most_averaged = loaded_with(math.inf)
         with np.errstate(all="ignore"):  # entries that are settled take part in the steps of the others
-            force = most_averaged.force(most_averaged.interval(math.inf)[0])
+            above, _ = most_averaged.lowest(math.inf)
+            force = most_averaged.force(above)
     count = contact.elements(force, element_area)
-    return least(select(count > COUNTS[0], count, COUNTS[0]), COUNTS[1])
+    return least(select(count > COUNTS[0], count, COUNTS[0]), COUNTS[1]), above
 
 
 def _contacts(contact_area: Number | None, contacts: Contact | Contacts | None) -> Contacts:
     if (contact_area is None) == (contacts is None):
         raise InvalidArgument("contact_area and contacts", "both or neither given", "one of them")
-    if isinstance(contacts, Contacts):
-        return contacts
-    return Contacts(contacts or Contact.flat(within("contact_area", contact_area, *AREAS, "m²")))
+    if contacts is None:
+        return Contacts(Contact.flat(within("contact_area", contact_area, *AREAS, "m²")))
+    if isinstance(contacts, Contact):
+        return Contacts(contacts)
+    if not isinstance(contacts, Contacts):
+        raise InvalidArgument("contacts", shown(contacts), "a Contact, or what antipodal and n_fingers make of one")
+    return contacts
 
 
 def _shares(
@@ -293,9 +300,9 @@ def _one(
 ) -> RequiredForce:
     """The answer to one question; ``asked``: the same at another slip probability."""
     loaded, most = question.loaded, float(question.loaded.root(question.limit))
-    low, high, holds = loaded.interval(most)
+    low, high, holds = loaded.interval(most, question.above)
     best = loaded.best(most)
-    per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.contacts.count)
+    per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.contacts)
     largest = math.inf if math.isinf(best) else loaded.held(best, per_load) if best > 0.0 else 0.0
     if not holds:
         raise NoFeasibleForce(
@@ -334,7 +341,7 @@ def _least_slip_probability(asked: Callable[[Number], _Question], refused: float
 
     def holds(probability: float) -> bool:
         question = asked(probability)
-        return bool(question.loaded.interval(question.loaded.root(question.limit))[2])
+        return bool(question.loaded.lowest(question.loaded.root(question.limit))[1])
 
     below, above = refused, SLIP_PROBABILITIES[1]
     if not holds(above):
@@ -348,10 +355,11 @@ def _least_slip_probability(asked: Callable[[Number], _Question], refused: float
 def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
     loaded = question.loaded
     with np.errstate(all="ignore"):  # entries that are settled take part in the steps of the others
-        low, high, holds = np.broadcast_arrays(*loaded.interval(loaded.root(question.limit)), *given)[:3]
+        ends = loaded.interval(loaded.root(question.limit), question.above)
+        low, high, holds = np.broadcast_arrays(*ends, *given)[:3]
         outcome = np.where(np.isinf(high), "held", "held within bounds").astype("<U18")
         if not holds.all():
-            outcome = np.where(holds, outcome, _causes(question))
+            outcome[~holds] = _causes(question.only(~holds))
         low, high = np.where(holds, low, np.nan), np.where(holds, high, np.nan)
         element = question.element_force(low)
         domain = question.model.domain

@@ -2,13 +2,15 @@
 
 import math
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from stiction_client.elementwise import Number, hypot, plain, select
+from stiction_client.elementwise import Number, hypot, of_these, plain, select
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FrictionModel
 from stiction_client.support import beyond_velocity, extrapolation_scale
@@ -45,9 +47,16 @@ class FrictionQuantile:
 
         Raises ``InvalidArgument`` for a model not finite there.
         """
+        return cls.over(model, tangential_velocity, probability)(elements)
+
+    @classmethod
+    def over(
+        cls, model: FrictionModel, tangential_velocity: Number, probability: Number
+    ) -> Callable[[Number], "FrictionQuantile"]:
+        """``of`` as a function of the number of elements alone, on which little of it depends."""
         from scipy import special  # takes longer to import than all else of this package
 
-        shared, own = (plain(part) for part in model.scatter(probability, elements))
+        shared, own = (plain(part) for part in model.scatter(probability))
         error = plain(-special.stdtrit(model.degrees_of_freedom, probability))
         b0, b1, b2 = coefficients = model.coefficients.tolist()
         covariance = model.covariance.tolist()
@@ -56,7 +65,7 @@ class FrictionQuantile:
         growth, (along, along_v), (apart, apart_v, apart_vv) = _factor(covariance)
         v = tangential_velocity
         level = b0 + v * b1
-        s = hypot(own, error * hypot(apart + v * apart_v, v * apart_vv))
+        s = error * hypot(apart + v * apart_v, v * apart_vv)
         k, g = error * (along + v * along_v), error * growth
         if model.scales is not None:
             s, k, g = _joined(s, k, g, shared * level, shared * b2)
@@ -64,7 +73,18 @@ class FrictionQuantile:
         low, high = model.domain.normal_force
         below, above = (each / bound if bound > 0.0 else 0.0 * each for bound in (low, high))
         s = hypot(s, each * beyond_velocity(model.domain, v))
-        return cls(level, b2, s, k, g, low, high, below, above)
+
+        def averaged(elements: Number) -> FrictionQuantile:
+            scatter = own if model.scales is None else own / elements**0.5
+            return cls(level, b2, hypot(s, scatter), k, g, low, high, below, above)
+
+        return averaged
+
+    def only(self, where: NDArray[np.bool_]) -> "FrictionQuantile":
+        """The curves of these entries of arrays."""
+        a, c, s, k, g = (of_these(each, where) for each in (self.a, self.c, self.s, self.k, self.g))
+        below, above = (of_these(each, where) for each in (self.below, self.above))
+        return FrictionQuantile(a, c, s, k, g, self.low, self.high, below, above)
 
     def _outside(self, force: Number) -> tuple[Number, Number]:
         """h and its slope."""

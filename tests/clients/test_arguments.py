@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stiction_client import InvalidArgument
-from stiction_client.arguments import for_json, within
+from stiction_client.arguments import for_json, number, of_kind, of_one_shape, within
 
 
 @pytest.mark.parametrize("value", [1, 1.0, np.float64(1.0), np.int32(1), np.array(1.0), np.float32(1.0)])
@@ -49,7 +49,9 @@ def test_what_is_beyond_is_told_with_the_range_and_its_unit(value: Any, shown: s
         within("load", value, 0.0, 2.0)
 
 
-@pytest.mark.parametrize("value", ["1", None, True, [True], 1j, [1.0, "2"], [None], "x" * 100])
+@pytest.mark.parametrize(
+    "value", ["1", None, True, [True], [1, True], [[1.0], (False,)], 1j, [1.0, "2"], [None], "x" * 100]
+)
 def test_what_is_no_number_is_told_as_such(value: Any) -> None:
     with pytest.raises(InvalidArgument) as refusal:
         within("load", value, 0.0, 2.0, "N")
@@ -72,3 +74,26 @@ def test_numbers_and_arrays_of_numpy_are_sent_as_plain_ones() -> None:
 def test_what_json_does_not_have_is_refused_by_name(value: Any) -> None:
     with pytest.raises(InvalidArgument, match=r"^thickness is .*; allowed: (a finite number|numbers, text)"):
         for_json("body", {"gel": {"thickness": value}})
+
+
+def test_a_masked_entry_is_no_number() -> None:
+    with pytest.raises(InvalidArgument, match=r"^load is masked_array"):
+        within("load", np.ma.masked_array([1.0, 2.0], [False, True]), 0.0, 2.0)
+
+
+def test_one_number_is_asked_for_where_arrays_are_no_answer() -> None:
+    assert number("area", np.float32(0.5), 0.0, 1.0) == 0.5
+    with pytest.raises(InvalidArgument, match=r"^area is \[0\.5, 0\.5\]; allowed: one number: 0 to 1 m$"):
+        number("area", [0.5, 0.5], 0.0, 1.0, "m")
+
+
+def test_arrays_that_do_not_belong_together_are_named_with_their_shapes() -> None:
+    of_one_shape(load=np.ones(3), area=1.0, torque=np.ones((2, 1)), limit=None)
+    with pytest.raises(InvalidArgument, match=r"^load and area is \[3\] and \[2\]; allowed: one length"):
+        of_one_shape(load=np.ones(3), area=np.ones(2), torque=1.0)
+
+
+def test_of_which_kinds_a_value_may_be_is_told() -> None:
+    of_kind("pair", (1, 2), tuple | list)
+    with pytest.raises(InvalidArgument, match=r"^pair is 3; allowed: an object of tuple or list$"):
+        of_kind("pair", 3, tuple | list)

@@ -656,6 +656,21 @@ def test_a_name_that_leads_to_another_route_or_is_none_is_refused_here(ask: Ask,
     assert not server.requests
 
 
+@pytest.mark.parametrize("url", [3, b"http://a", ["http://a"]])
+def test_an_address_is_text(url: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^address is .*; allowed: an object of str"):
+        FrictionClient(url)
+
+
+@pytest.mark.parametrize("wrong", ["v", "fn"])
+def test_friction_is_asked_for_at_a_velocity_and_a_force(ask: Ask, service: Service, wrong: str) -> None:
+    """What is not sent would be 0 to the service."""
+    server = service({})
+    with pytest.raises(InvalidArgument, match=f"^{wrong} is None; allowed: a number"):
+        ask(server, "friction", "paper", **({"v": 0.0, "fn": 0.05} | {wrong: None}))
+    assert not server.requests
+
+
 @pytest.mark.parametrize("url", ["http://[::1", "http://\udcff", "http://a:b:c", f"http://{'a' * 100_000}"])
 def test_an_address_that_is_none_is_refused_by_name(url: str) -> None:
     with pytest.raises(InvalidArgument, match=r"^address is 'http://.*; allowed: one such as http://127") as refused:

@@ -15,6 +15,7 @@ from stiction_client import (
     FrictionModel,
     InvalidArgument,
     NoFeasibleForce,
+    RequiredForce,
     antipodal,
     grasp,
     n_fingers,
@@ -287,6 +288,82 @@ def test_only_a_model_is_taken_for_one(model: Any) -> None:
 def test_a_measured_pressure_has_a_place_for_each_element(x: Any, y: Any, message: str) -> None:
     with pytest.raises(InvalidArgument, match=message):
         Contact.measured(np.array([1e3, 2e3]), x, y, 1e-6)
+
+
+@pytest.mark.parametrize("wrong", [0, "", 6e-5, True, [Contact.flat(AREA)], np.array([1.0]), np.zeros(0)])
+def test_only_contacts_are_taken_for_contacts(make_model: Make, wrong: Any) -> None:
+    with pytest.raises(InvalidArgument, match=r"^contacts is .*; allowed: a Contact, or what antipodal"):
+        required_normal_force(make_model(), 1.0, contacts=wrong)
+    with pytest.raises(InvalidArgument, match=r"^contact is "):
+        antipodal(wrong)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda: Contact(-1.0), "area"),
+        (lambda: Contact(math.nan), "area"),
+        (lambda: Contact("x"), "area"),  # type: ignore[arg-type]
+        (lambda: Contact(AREA, reference_force=0.0), "reference_force"),
+        (lambda: Contact(AREA, pressure_square=0.5), "pressure_square"),
+        (lambda: Contact(AREA, torque_arm=-1e-3), "torque_arm"),
+        (lambda: Contact(np.full(2, AREA), torque_arm=np.zeros(3)), "area and torque_arm"),
+        (lambda: Contact.round(AREA, np.array([5.0, 6.0])), "at_force"),  # type: ignore[arg-type]
+        (lambda: Contacts(Contact.flat(AREA), 0), "count"),
+        (lambda: Contacts(Contact.flat(AREA), -2), "count"),
+        (lambda: Contacts(Contact.flat(AREA), 2, 0.0), "lever_arm"),
+    ],
+)
+def test_a_contact_made_by_hand_is_one(make: Callable[[], object], name: str) -> None:
+    with pytest.raises(InvalidArgument, match=f"^{name} is"):
+        make()
+
+
+def test_lever_arms_of_another_length_are_named(make_model: Make) -> None:
+    lids = n_fingers(3, Contact.flat(AREA), np.array([0.02, 0.03]))
+    with pytest.raises(InvalidArgument, match=r"^tangential_load and object_radius is \[3\] and \[2\]"):
+        required_normal_force(make_model(), np.ones(3), contacts=lids)
+
+
+def test_a_measured_pressure_counts_by_its_shape_alone() -> None:
+    pressure, x, y = np.array([1.0, 2.0, 3.0]), np.array([0.0, 1e-3, 2e-3]), np.zeros(3)
+    plain, faint = (Contact.measured(scale * pressure, x, y, 1e-6) for scale in (1.0, 1e-200))
+    assert faint == plain
+
+
+@pytest.mark.parametrize("power", ["flat", "round"])
+def test_the_least_loads_need_no_more_force_than_greater_ones(make_model: Make, power: str) -> None:
+    contact = Contact.flat(AREA) if power == "flat" else Contact.round(AREA, at_force=5.0)
+    rough = make_model((1e5, 0.0, 0.0), np.zeros((3, 3)), scale=0.0, normal_force_domain=(0.0, 1e9))
+    forces = [required_normal_force(rough, load, contacts=contact).normal_force for load in (0.0, 5e-324, 1e-300, 1.0)]
+    assert forces == sorted(forces)
+    assert forces[-1] == pytest.approx(1e-5)
+
+
+def answer(model: FrictionModel, load: float, contact: Contact) -> RequiredForce | NoFeasibleForce:
+    """What is answered to one grasp, a refusal too."""
+    try:
+        return required_normal_force(model, load, contacts=contact, torque=1e-3)
+    except NoFeasibleForce as refusal:
+        return refusal
+
+
+def test_grasps_that_take_many_steps_and_those_that_slip_do_not_change_the_others(make_model: Make) -> None:
+    """Most of 4000 grasps are settled sooner than those next to the most that is held, and some are never held."""
+    model = make_model((0.45, 0.0, -1.0), np.diag([1e-5, 0.0, 1e-3]))
+    for contact in (Contact.flat(AREA), Contact.round(AREA, at_force=5.0)):
+        most = required_normal_force(model, 1.0, contacts=contact, torque=1e-3).largest_load
+        load = np.r_[np.linspace(0.1, 0.5, 3600) * most, np.linspace(0.9, 1.1, 400) * most]
+        many = required_normal_force(model, load, contacts=contact, torque=np.full(load.size, 1e-3))
+        for index in (0, 1800, *range(3600, 4000, 7)):
+            one = answer(model, float(load[index]), contact)
+            if isinstance(one, NoFeasibleForce):
+                assert many.outcome[index] == one.cause
+                assert np.isnan(many.normal_force[index])
+            else:
+                assert many.normal_force[index] == pytest.approx(one.normal_force, rel=1e-9)
+                assert many.feasible_interval[1][index] == pytest.approx(one.feasible_interval[1], rel=1e-6)
+        assert (many.outcome[:3600] == "held within bounds").all()
 
 
 def test_fingers_are_whole() -> None:

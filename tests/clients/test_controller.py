@@ -465,6 +465,13 @@ def test_an_observation_that_cannot_be_is_refused_by_name(wrong: dict[str, Any],
 def test_what_is_no_observation_at_all_is_refused() -> None:
     with pytest.raises(InvalidArgument, match="observation is None; allowed: an object of Observation"):
         GraspController.step(GraspController.init(SETTINGS), None)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgument, match="state is None; allowed: an object of ControllerState"):
+        GraspController.step(None, Observation(1.1, 1.0, 0.1, 0.0, 0.9))  # type: ignore[arg-type]
+
+
+def test_the_contact_of_a_controller_is_one() -> None:
+    with pytest.raises(InvalidArgument, match=r"^contact is Contact\(area=array.*; allowed: one contact, of one area"):
+        dataclasses.replace(SETTINGS, contact=Contact.flat(np.array([6e-5, 1e-5])))
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from stiction_client import InvalidArgument
-from stiction_client.controller.records import Command, Observation, SlipSamples, check
+from stiction_client.controller.records import Command, Observation, SlipSamples, checked
 
 SEEN = Observation(1.0, 2.0, 0.5, 0.01, 0.75, SlipSamples(np.array([0.4, 0.5]), np.array([0.1, 0.3]), 0.5))
 
 
 def test_a_frame_is_taken_up_to_the_ends_of_each_range() -> None:
-    check(SEEN, 0.999)
-    check(SEEN, -math.inf)
+    checked(SEEN, 0.999)
+    checked(SEEN, -math.inf)
     for changes in (
         {"normal": 0.0, "tangential": 0.0, "torque": 0.0},
         {"stick_ratio": 0.0},
@@ -25,25 +25,37 @@ def test_a_frame_is_taken_up_to_the_ends_of_each_range() -> None:
         {"slip_samples": SlipSamples(np.zeros(1), np.zeros(1), 0.0)},
         {"slip_samples": SlipSamples(np.zeros(0), np.zeros(0), 1.0)},
     ):
-        check(replace(SEEN, **changes), 0.0)
+        checked(replace(SEEN, **changes), 0.0)
 
 
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"time": 0.5}, r"time is 0\.5; allowed: finite, later than 0\.5 s"),
+        ({"time": 0.5}, r"time is 0\.5; allowed: later than 0\.5 s, and within 1e\+12 s of 0"),
         ({"time": math.inf}, "time is inf"),
         ({"time": math.nan}, "time is nan"),
-        ({"normal": -1e-9}, "normal is -1e-09; allowed: a finite magnitude of 0 or more; without one, leave the frame"),
+        ({"normal": -1e-9}, r"normal is -1e-09; allowed: a magnitude of 0 to 1e\+09; without one, leave the frame"),
         ({"tangential": math.nan}, "tangential is nan"),
         ({"torque": math.inf}, "torque is inf"),
         ({"stick_ratio": 1.01}, r"stick_ratio is 1\.01; allowed: 0 to 1, or NaN where none is known"),
         ({"stick_ratio": -0.01}, "stick_ratio is"),
+        ({"stick_ratio": 10**400}, "stick_ratio is 1000"),
+        ({"time": 10**400}, "time is 1000"),
+        ({"tangential": 1e300}, r"tangential is 1e\+300"),
+        ({"torque": 10**400}, "torque is 1000"),
     ],
 )
 def test_a_number_that_cannot_be_is_named(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(InvalidArgument, match=told):
-        check(replace(SEEN, **changes), 0.5)
+        checked(replace(SEEN, **changes), 0.5)
+
+
+def test_numbers_of_other_kinds_become_floats() -> None:
+    """A time in single precision would be told to a second only after half a year."""
+    seen = checked(Observation(np.float32(1.0), 2, np.float64(0.5), np.int64(0), 1, SEEN.slip_samples), 0.0)  # type: ignore[arg-type]
+    assert seen == Observation(1.0, 2.0, 0.5, 0.0, 1.0, SEEN.slip_samples)
+    assert {type(each) for each in (seen.time, seen.normal, seen.tangential, seen.torque, seen.stick_ratio)} == {float}
+    assert checked(SEEN, 0.0) is SEEN
 
 
 @pytest.mark.parametrize(
@@ -56,14 +68,14 @@ def test_a_number_that_cannot_be_is_named(changes: dict[str, Any], told: str) ->
         (SlipSamples(np.array([0.4, -0.1]), np.zeros(2)), r"slip_samples\.friction_coefficient is \[0\.4, -0\.1\]"),
         (
             SlipSamples(np.zeros(2), np.array([0.1, np.inf])),
-            r"slip_samples\.normal_force is \[0\.1, inf\]; allowed: fin",
+            r"slip_samples\.normal_force is \[0\.1, inf\]; allowed: numbers of 0 to 1e\+09",
         ),
         (SlipSamples(np.array([np.nan, 0.1]), np.zeros(2)), r"slip_samples\.friction_coefficient is"),
     ],
 )
 def test_samples_that_cannot_be_are_named(samples: SlipSamples, told: str) -> None:
     with pytest.raises(InvalidArgument, match=told):
-        check(replace(SEEN, slip_samples=samples), 0.0)
+        checked(replace(SEEN, slip_samples=samples), 0.0)
 
 
 def test_friction_of_a_contact_weighs_its_elements_by_force() -> None:

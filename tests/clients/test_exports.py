@@ -125,7 +125,7 @@ def test_the_linearised_cone_lies_inside_the_true_one_and_fills_it(make_model: M
 
 
 def test_a_cone_needs_three_edges(make_model: Make) -> None:
-    with pytest.raises(InvalidArgument, match="edges is 2; allowed: at least 3"):
+    with pytest.raises(InvalidArgument, match="edges is 2; allowed: 3 to 100000"):
         friction_cone(make_model(), 0.1, edges=2)
 
 
@@ -321,3 +321,40 @@ def test_names_in_xml_are_written_as_xml(make_model: Make) -> None:
     name = 'left <"finger"> & thumb'
     assert ElementTree.fromstring(MujocoPair(name, "b", 0.5, 0.0, 0.0).to_xml()).attrib["geom1"] == name
     assert ElementTree.fromstring(urdf_gazebo(make_model(), name, 0.05)).attrib["reference"] == name
+
+
+@pytest.mark.parametrize(
+    "export",
+    [conservative_friction, drake_friction, physx_material, mujoco_friction, mujoco_geom, dexnet_friction, sdf_surface],
+)
+def test_only_a_model_is_exported(export: Callable[..., object]) -> None:
+    for model in (None, 0.4, "paper"):
+        with pytest.raises(InvalidArgument, match=r"^model is .*; allowed: a FrictionModel"):
+            export(model, 0.05)
+    with pytest.raises(InvalidArgument, match=r"^model is None"):
+        graspit_friction(None, ("glass", "stone"), 0.05)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgument, match=r"^model is None"):
+        mujoco_pair(None, ("a", "b"), 5.0, PAD)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wrong", [None, "1", True, [0.05], np.array([0.05, 0.06]), 1j])
+def test_what_is_no_number_of_an_export_is_named(make_model: Make, wrong: Any) -> None:
+    model = make_model()
+    asked: dict[str, Callable[[], object]] = {
+        "quantile": lambda: conservative_friction(model, 0.05, wrong),
+        "contact_area": lambda: conservative_friction(model, 0.05, contact_area=wrong),
+        "contact_radius": lambda: mujoco_friction(model, 0.05, contact_radius=wrong),
+        "edges": lambda: friction_cone(model, 0.05, edges=wrong),
+        "static_friction": lambda: CoulombFriction(wrong, 0.3),
+        "grip_force": lambda: mujoco_pair(model, ("a", "b"), wrong, PAD),
+        "contact": lambda: mujoco_pair(model, ("a", "b"), 5.0, wrong),
+        "link": lambda: urdf_gazebo(model, 3 if isinstance(wrong, str) else wrong, 0.05),  # type: ignore[arg-type]
+        "answer": lambda: moveit_max_contact_force(wrong),
+    }
+    for name, call in asked.items():
+        with pytest.raises(InvalidArgument, match=f"^{name} is"):
+            call()
+    with pytest.raises(InvalidArgument, match=r"^materials is 3"):
+        graspit_friction(model, 3, 0.05)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgument, match=r"^answer is 3\.0"):
+        contactile_answer(3.0)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ from stiction_client.arguments import of_kind
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.recognition import UNKNOWN, GripRecognition
-from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
+from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, checked
 from stiction_client.controller.relaxation import Relaxation
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import StickRatioEstimate
@@ -84,7 +84,8 @@ def step(state: ControllerState, observation: Observation) -> tuple[ControllerSt
 
     Raises ``InvalidArgument`` for an observation that cannot be; the state before it can still be used.
     """
-    check(observation, state.time)
+    of_kind("state", state, ControllerState)
+    observation = checked(observation, state.time)
     state, elapsed = _taken_over(state, observation), observation.time - state.time
     seen = _decide(_sense(state, observation, elapsed), observation)
     demand = max(_demands(seen, observation), key=lambda each: each.force)

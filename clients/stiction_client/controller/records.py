@@ -9,10 +9,17 @@ import numpy as np
 from stiction_client.arguments import of_kind, shown
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
+from stiction_client.planner import LARGEST
 
 Mode = Literal["feel", "learn", "hold", "alarm"]
 """feel: friction unknown, regulated by the stick ratio; learn: the same, and the force falls until enough slips to be
 sampled; hold: by a friction model; alarm: slip, evidence against the model, or nothing known."""
+
+NUMBERS = ("time", "normal", "tangential", "torque", "stick_ratio")
+"""Of an observation."""
+
+LATEST = 1e12
+"""s from 0, as of a live stream."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,24 +68,29 @@ class Command:
     probability: float = 0.0
 
 
-def check(observation: Observation, last: float) -> None:
-    """Refuse an observation that cannot be, or is no later than ``last`` s; raises ``InvalidArgument``."""
+def checked(observation: Observation, last: float) -> Observation:
+    """An observation in plain floats; raises ``InvalidArgument`` for one that cannot be, or not after ``last`` s."""
     of_kind("observation", observation, Observation)
-    for name in ("time", "normal", "tangential", "torque", "stick_ratio"):
-        value = getattr(observation, name)
+    seen = observation
+    numbers = (seen.time, seen.normal, seen.tangential, seen.torque, seen.stick_ratio)
+    for name, value in zip(NUMBERS, numbers, strict=True):
         if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
             raise InvalidArgument(name, shown(value), "a number")
-    if not last < observation.time < math.inf:
-        raise InvalidArgument("time", observation.time, f"finite, later than {last:.9g} s")
-    for name in ("normal", "tangential", "torque"):
-        value = getattr(observation, name)
-        if not 0.0 <= value < math.inf:
-            raise InvalidArgument(name, value, "a finite magnitude of 0 or more; without one, leave the frame out")
-    if not (math.isnan(observation.stick_ratio) or 0.0 <= observation.stick_ratio <= 1.0):
-        raise InvalidArgument("stick_ratio", observation.stick_ratio, "0 to 1, or NaN where none is known")
-    if observation.slip_samples is not None:
-        of_kind("slip_samples", observation.slip_samples, SlipSamples)
-        _check_samples(observation.slip_samples)
+    if not last < seen.time or not abs(seen.time) <= LATEST:
+        raise InvalidArgument("time", shown(seen.time), f"later than {last:.9g} s, and within {LATEST:g} s of 0")
+    for name, value in zip(NUMBERS[1:4], numbers[1:4], strict=True):
+        if not 0.0 <= value <= LARGEST:
+            allowed = f"a magnitude of 0 to {LARGEST:g}; without one, leave the frame out"
+            raise InvalidArgument(name, shown(value), allowed)
+    if not (seen.stick_ratio != seen.stick_ratio or 0.0 <= seen.stick_ratio <= 1.0):
+        raise InvalidArgument("stick_ratio", shown(seen.stick_ratio), "0 to 1, or NaN where none is known")
+    if seen.slip_samples is not None:
+        of_kind("slip_samples", seen.slip_samples, SlipSamples)
+        _check_samples(seen.slip_samples)
+    if all(type(value) is float for value in numbers):
+        return observation
+    time, normal, tangential, torque, stick_ratio = map(float, numbers)
+    return Observation(time, normal, tangential, torque, stick_ratio, seen.slip_samples)
 
 
 def _check_samples(samples: SlipSamples) -> None:
@@ -90,5 +102,5 @@ def _check_samples(samples: SlipSamples) -> None:
         if values.shape != samples.friction_coefficient.shape or values.ndim != 1:
             raise InvalidArgument(f"slip_samples.{name}", f"of shape {list(values.shape)}", "two arrays [k]")
         numbers = values.tolist()  # a few dozen, sooner compared one by one than by NumPy
-        if not all(0.0 <= number < math.inf for number in numbers):
-            raise InvalidArgument(f"slip_samples.{name}", numbers, "finite numbers of 0 or more")
+        if not all(0.0 <= number <= LARGEST for number in numbers):
+            raise InvalidArgument(f"slip_samples.{name}", numbers, f"numbers of 0 to {LARGEST:g}")

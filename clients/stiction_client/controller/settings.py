@@ -4,7 +4,9 @@ import warnings
 from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, get_type_hints
 
-from stiction_client.arguments import of_kind, within
+import numpy as np
+
+from stiction_client.arguments import of_kind, shown, within
 from stiction_client.contacts import Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.planner import SLIP_PROBABILITIES, SLIP_PROBABILITY
@@ -118,6 +120,8 @@ class ControlSettings:
         if self.contradiction_share != WITHOUT_EFFECT:
             warnings.warn("contradiction_share has no effect any more", DeprecationWarning, stacklevel=3)
         of_kind("contact", self.contact, Contact)
+        if any(isinstance(each, np.ndarray) for each in (self.contact.area, self.contact.pressure_square)):
+            raise InvalidArgument("contact", shown(self.contact), "one contact, of one area")
         for name, gain in gains().items():
             value = getattr(self, name)
             if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):

@@ -5,10 +5,11 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from stiction_client.arguments import shown, within
+from stiction_client.arguments import number, shown, whole
 from stiction_client.contacts import AREAS
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
+from stiction_client.linear_friction import check_model
 from stiction_client.model import FORCES, VELOCITIES, FrictionModel
 
 QUANTILE = 0.05
@@ -17,6 +18,9 @@ QUANTILE = 0.05
 
 FINGERTIP = 6e-5
 """m²; contact of a fingertip under some newtons."""
+
+MOST_EDGES = 100_000
+"""Of a linearised cone, which then lacks 5·10⁻¹⁰ of μ."""
 
 
 class Terms(TypedDict, total=False):
@@ -44,15 +48,14 @@ def conservative_friction(
     of μ isn't positive, and for friction that is not determined or implausible: pass
     ``allow_unidentified`` to have the quantile anyway.
     """
+    check_model(model)
     v, f_n = (
-        within("tangential_velocity", tangential_velocity, *VELOCITIES),
-        within("normal_force", normal_force, *FORCES),
+        number("tangential_velocity", tangential_velocity, *VELOCITIES),
+        number("normal_force", normal_force, *FORCES),
     )
-    if isinstance(v, np.ndarray) or isinstance(f_n, np.ndarray):
-        raise InvalidArgument("normal_force", shown(normal_force), "one number: call once for each")
-    if not 0.0 < quantile <= 0.5:
-        raise InvalidArgument("quantile", quantile, "above 0, at most 0.5: a bound from below")
-    elements = max(float(within("contact_area", contact_area, *AREAS, "m²")) / model.element_area, 1.0)
+    if isinstance(quantile, bool) or not isinstance(quantile, float | int | np.number) or not 0.0 < quantile <= 0.5:
+        raise InvalidArgument("quantile", shown(quantile), "above 0, at most 0.5: a bound from below")
+    elements = max(number("contact_area", contact_area, *AREAS, "m²") / model.element_area, 1.0)
     support = model.support_at(v, f_n)
     if not allow_unidentified and support.kind in ("not identified", "implausible"):
         allowed = "supported, or allow_unidentified=True"
@@ -72,11 +75,10 @@ def friction_cone(
     Their non-negative combinations lie inside the cone |f_t| ≤ μ f_n (an inner approximation, hence conservative);
     between two edges it loses at most the part 1 − cos(π/edges) of μ.
     """
-    if edges < 3:
-        raise InvalidArgument("edges", edges, "at least 3")
+    count = whole("edges", edges, 3, MOST_EDGES)
     friction = conservative_friction(model, normal_force, quantile, **terms)
-    angle = 2.0 * np.pi * np.arange(edges) / edges
-    return np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(edges)], axis=-1)
+    angle = 2.0 * np.pi * np.arange(count) / count
+    return np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(count)], axis=-1)
 
 
 def cone_half_angle(

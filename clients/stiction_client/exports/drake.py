@@ -1,12 +1,13 @@
 """Friction for Drake (drake.mit.edu, CoulombFriction and "Hydroelastic/point contact"; version 1.51)."""
 
-import math
+import sys
 from dataclasses import dataclass
 from typing import Unpack
 
-from stiction_client.arguments import within
+from stiction_client.arguments import number
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
+from stiction_client.linear_friction import check_model
 from stiction_client.model import FrictionModel
 
 
@@ -22,9 +23,7 @@ class CoulombFriction:
 
     def __post_init__(self) -> None:
         for name in ("static_friction", "dynamic_friction"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise InvalidArgument(name, value, "finite, and at least 0")
+            number(name, getattr(self, name), 0.0, sys.float_info.max)
         if self.dynamic_friction > self.static_friction:
             raise InvalidArgument(
                 "dynamic_friction", self.dynamic_friction, f"at most {self.static_friction:g}, static"
@@ -60,14 +59,15 @@ def drake_friction(
     or name the ``other_friction`` [-] of the other, and this is the one that makes the pair right. Raises
     ``InvalidArgument`` where none can: a pair never has twice the other's friction.
     """
+    check_model(model)
     fastest = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
-    velocity = float(within("sliding_velocity", fastest, 0.0, 1e3, "m/s"))
+    velocity = number("sliding_velocity", fastest, 0.0, 1e3, "m/s")
     static = conservative_friction(model, normal_force, quantile, **terms)
     moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
     dynamic = static if discrete else min(static, moving)
     if other_friction is None:
         return CoulombFriction(static, dynamic)
-    other = float(within("other_friction", other_friction, 1e-9, 1e9))
+    other = number("other_friction", other_friction, 1e-9, 1e9)
     return CoulombFriction(_beside(other, static), _beside(other, dynamic))
 
 

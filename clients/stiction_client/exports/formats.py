@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from typing import Unpack
 from xml.sax.saxutils import quoteattr
 
+from stiction_client.arguments import of_kind
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
+from stiction_client.linear_friction import check_model
 from stiction_client.model import FrictionModel
 from stiction_client.planner import RequiredForce
 
@@ -46,6 +48,7 @@ def physx_material(
 
     ``normal_force`` N an element.
     """
+    check_model(model)
     velocity = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
     static = conservative_friction(model, normal_force, quantile, **terms)
     moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
@@ -62,6 +65,7 @@ def urdf_gazebo(
     model: FrictionModel, link: str, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
 ) -> str:
     """Gazebo's extension of a URDF ``link``; URDF itself has no friction of contacts."""
+    of_kind("link", link, str)
     friction = conservative_friction(model, normal_force, quantile, **terms)
     return f"<gazebo reference={quoteattr(link)}><mu1>{friction:.9g}</mu1><mu2>{friction:.9g}</mu2></gazebo>"
 
@@ -80,6 +84,7 @@ def dexnet_friction(model: FrictionModel, normal_force: float, **terms: Unpack[T
 
 def moveit_max_contact_force(answer: RequiredForce) -> float:
     """``max_contact_force`` of MoveIt's Grasp message, N: the largest that holds; 0, its word for none, if any do."""
+    of_kind("answer", answer, RequiredForce)
     largest = answer.feasible_interval[1]
     return largest if math.isfinite(largest) else 0.0
 
@@ -88,4 +93,5 @@ def contactile_answer(answer: RequiredForce | None) -> dict[str, float]:
     """What Contactile's PapillArray gives its users: ``friction_est`` [-], -1 for none, and ``target_grip_force`` N."""
     if answer is None:
         return {"friction_est": -1.0, "target_grip_force": -1.0}
+    of_kind("answer", answer, RequiredForce)
     return {"friction_est": answer.friction_coefficient, "target_grip_force": answer.normal_force}

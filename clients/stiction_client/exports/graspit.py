@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from typing import Unpack
 
+from stiction_client.arguments import of_kind
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
+from stiction_client.linear_friction import check_model
 from stiction_client.model import FrictionModel
 
 GRASPIT_MATERIALS = ("frictionless", "glass", "metal", "plastic", "wood", "rubber", "stone")
@@ -51,6 +53,8 @@ def graspit_friction(
     observed), never above it. Raises ``InvalidArgument`` for a material that GraspIt! doesn't have, or whose name
     promises no friction.
     """
+    check_model(model)
+    of_kind("materials", materials, tuple | list)
     for name in materials:
         if name not in GRASPIT_MATERIALS[1:]:
             raise InvalidArgument("materials", repr(name), f"two of {', '.join(GRASPIT_MATERIALS[1:])}")
@@ -59,4 +63,4 @@ def graspit_friction(
     velocity = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
     static = conservative_friction(model, normal_force, quantile, **terms)
     moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
-    return GraspitFriction(materials, static, min(static, moving))
+    return GraspitFriction((materials[0], materials[1]), static, min(static, moving))

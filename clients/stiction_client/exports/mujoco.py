@@ -1,14 +1,14 @@
 """Friction for MuJoCo (mujoco.readthedocs.io, XML reference: contact/pair, geom, option; versions 3.11 and 4)."""
 
-import math
 from dataclasses import dataclass
 from typing import Unpack
 from xml.sax.saxutils import quoteattr
 
-from stiction_client.arguments import shown, whole, within
+from stiction_client.arguments import number, of_kind, shown, whole
 from stiction_client.contacts import HERTZ_TORSION, Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
+from stiction_client.linear_friction import check_model
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 
@@ -65,7 +65,9 @@ def mujoco_pair(
     that grows with force, or falls so fast that pressing harder holds less.
     """
     first, second = _names(geoms)
-    force = float(within("grip_force", grip_force, 1e-9, 1e9, "N"))
+    check_model(model)
+    of_kind("contact", contact, Contact)
+    force = number("grip_force", grip_force, 1e-9, 1e9, "N")
     count = whole("points", points, 1, 1000, "points")
     element = float(contact.element_force(force, model.element_area))
     elements = max(float(contact.elements(force, model.element_area)), 1.0)
@@ -107,10 +109,9 @@ def mujoco_friction(
     Torsional friction is that of a Hertzian contact of ``contact_radius`` m (0: a point, none); rolling friction
     isn't in the model and is 0. Sliding friction is taken at rest.
     """
-    if not 0.0 <= contact_radius < math.inf:
-        raise InvalidArgument("contact_radius", contact_radius, "m, at least 0 and finite")
+    radius = number("contact_radius", contact_radius, 0.0, 10.0, "m")
     sliding = conservative_friction(model, normal_force, quantile, **terms)
-    return sliding, HERTZ_TORSION * contact_radius * sliding, 0.0
+    return sliding, HERTZ_TORSION * radius * sliding, 0.0
 
 
 def mujoco_geom(
