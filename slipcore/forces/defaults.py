@@ -95,6 +95,10 @@ class StrengthDefaults(Options):
     """The same in units of what makes the strongest singular direction equal to noise; the lesser counts."""
     grid: Annotated[int, Option(3, 1000, "strengths", "brackets the best, which is refined")] = 41
     """Tried at equal ratios before the best is refined."""
+    steps: Annotated[int, Option(1, 1000, "steps", "bound; one to three do")] = 30
+    """By Newton's method from a strength that is nearly the best."""
+    settled: Annotated[float, Option(1e-9, 10.0, "nats", "what is then left is a twentieth of it")] = 0.2
+    """Gain of a step after which none follows."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 from slipcore.contact.elasticity.grid import bounding_box
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION, RECONSTRUCTION
 from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, choose_prior, fit, log_evidence
-from slipcore.forces.inverse.support import better_support, widened
+from slipcore.forces.inverse.support import SupportCandidate, better_support, widened
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.response import response_matrix
@@ -170,10 +170,12 @@ def _better(
 ) -> PressContact:
     """A contact that explains a press better."""
     support, prior = contact
+    everything = (observation, data, nodes)
     for _ in range(1 if seek == "support" else GEL_CALIBRATION.alternations):
         if seek == "both":
-            prior = choose_prior(observation, data, nodes, support.ravel(), first=prior.smoothness)
-        before, support = support, better_support(observation, data, nodes, support, prior.smoothness)[0].support
+            prior = choose_prior(*everything, support.ravel(), first=prior.smoothness)
+        first = SupportCandidate(support, *log_evidence(*everything, support.ravel(), prior.smoothness))
+        before, support = support, better_support(*everything, first)[0].support
         if (before == support).all():
             break
     return PressContact(support, prior)

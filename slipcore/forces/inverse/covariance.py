@@ -24,6 +24,11 @@ def covariance_root(spread: FloatArray) -> FloatArray:
     return _eliminated(spread.T)[0]
 
 
+def triangles_root(upper: FloatArray) -> FloatArray:
+    """R [r, r], upper triangular, of 1 + UᵀU = Rᵀ R for U [r, r] that is upper triangular: of a quarter of the cost."""
+    return _eliminated(upper, triangular=True)[0]
+
+
 def posterior(response: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Of unknowns [p] by data [m] that a ``response`` A [m, p] makes of them: a root [p, p], upper triangular, of their
     covariance (1 + AᵀA)⁻¹, and the operator (1 + AᵀA)⁻¹ Aᵀ [p, m] from data to their mean.
@@ -42,18 +47,31 @@ def posterior(response: FloatArray) -> tuple[FloatArray, FloatArray]:
     return root, -root @ (below @ factor).T
 
 
+def posterior_operator(response: FloatArray) -> FloatArray:
+    """The operator of ``posterior`` alone, where data are fewer than unknowns from their covariance RᵀR = 1 + A Aᵀ:
+    (R⁻ᵀ A)ᵀ R⁻ᵀ, of which no factor is larger than 1.
+    """
+    m, p = response.shape
+    if m >= p:
+        return posterior(response)[1]
+    seen = solve_root(covariance_root(response), np.column_stack((response, np.eye(m))), transposed=True)
+    return np.asarray(seen[:, :p].T @ seen[:, p:])
+
+
 def solve_root(root: FloatArray, data: FloatArray, *, transposed: bool = False) -> FloatArray:
     """R⁻¹ D of data D [m, n], or (Rᵀ)⁻¹ D."""
     return np.asarray(lapack.dtrtrs(root, data, trans=int(transposed))[0])
 
 
-def _eliminated(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """R [p, p] by QR of the unit matrix on top of a ``matrix`` [m, p], and V [m, p] of the reflectors [1; V]."""
+def _eliminated(matrix: FloatArray, triangular: bool = False) -> tuple[FloatArray, FloatArray]:
+    """R [p, p] by QR of the unit matrix on top of a ``matrix`` [m, p], and V [m, p] of the reflectors [1; V]; of one
+    that is upper ``triangular`` zeros are kept.
+    """
     m, p = matrix.shape
     block = min(32, p)  # columns at a time; of all sizes about as fast
     root, below = np.eye(p, order="F"), np.array(matrix, dtype=np.float64, order="F")
     reflectors, work = np.empty((block, p), order="F"), np.empty(block * p)
-    sizes = [byref(c_int(size)) for size in (m, p, 0, block)]
+    sizes = [byref(c_int(size)) for size in (m, p, m if triangular else 0, block)]
     arrays = [(root, p), (below, max(m, 1)), (reflectors, block)]
     info = c_int()
     _dtpqrt(*sizes, *(each for array, rows in arrays for each in (array.ctypes.data, byref(c_int(rows)))),

@@ -1,13 +1,15 @@
 """Traction on a known support, with its covariance: Bayesian regression by QR, which squares no condition number."""
 
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from slipcore.forces.defaults import FIT
-from slipcore.forces.inverse.covariance import posterior
+from slipcore.forces.inverse.covariance import covariance_root, posterior, posterior_operator, solve_root
+from slipcore.forces.inverse.nearby_strength import TriangularResponse
 from slipcore.forces.inverse.prior import Smoothness, choices, factors, usual
 from slipcore.forces.inverse.strength import Criterion, Spectrum
 from slipcore.forces.operator.nodes import Nodes
@@ -29,20 +31,20 @@ class ObservationModel:
     response: FloatArray
     noise: FloatArray
 
-    def whitened(self, nodes: BoolArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The response [m, 3, j] of some nodes, the j chosen ones, and data [m], divided by the noise."""
-        return self.response[:, :, nodes] / self.noise[:, None, None], data / self.noise
+    def whitened(self, nodes: BoolArray) -> FloatArray:
+        """The response [m, 3, j] of some nodes, the j chosen ones, divided by the noise."""
+        return np.asarray(np.take(self.response, np.flatnonzero(nodes), axis=2) / self.noise[:, None, None])
 
     def within(self, nodes: BoolArray, data: FloatArray) -> tuple["ObservationModel", FloatArray]:
         """The same of some nodes alone, and data [m]: in no more than these have tractions, each of noise 1."""
-        response, reached = condensed(*self.whitened(nodes, data))
+        response, reached = condensed(self.whitened(nodes), data / self.noise)
         whole = np.zeros((len(reached), 3, len(nodes)))
         whole[:, :, nodes] = response
         return ObservationModel(whole, np.ones(len(reached))), reached
 
     def on(self, nodes: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Q [m, r] and R [r, 3, j] of the whitened response of some nodes, the j chosen ones."""
-        used = (self.response[:, :, nodes] / self.noise[:, None, None]).reshape(len(self.noise), -1)
+        used = self.whitened(nodes).reshape(len(self.noise), -1)
         q, r = scipy.linalg.qr(used, mode="economic", check_finite=False)
         return np.asarray(q), np.asarray(r.reshape(len(r), 3, -1))
 
@@ -54,21 +56,27 @@ class ObservationModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TractionFit:
-    """Posterior of the tractions (q_x, q_y, p) at the ``support`` [j] nodes, for any data of one observation.
-
-    ``operator`` [3 j, m] gives its mean from data; ``root`` [3 j, 3 j] times its transpose is its covariance;
-    ``prior_root`` [3, j, j] the same before any data.
+class TractionMean:
+    """Mean of the tractions (q_x, q_y, p) at the ``support`` [j] nodes, for any data of one observation: by an
+    ``operator`` [3 j, m].
     """
 
     support: BoolArray
     operator: FloatArray
-    root: FloatArray
-    prior_root: FloatArray
 
     def mean(self, data: FloatArray) -> FloatArray:
         """Mean tractions [3, j] given data [m], whether or not they pull."""
         return np.asarray((self.operator @ data).reshape(3, -1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TractionFit(TractionMean):
+    """Their whole posterior: ``root`` [3 j, 3 j] times its transpose is its covariance; ``prior_root`` [3, j, j] the
+    same before any data.
+    """
+
+    root: FloatArray
+    prior_root: FloatArray
 
     def traction(self, mean: FloatArray) -> FloatArray:
         """The most probable tractions [3, j] that pull no more than ``FIT.tension`` allows, given their ``mean`` [3, j]
@@ -136,6 +144,27 @@ def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: 
     return TractionFit(support, to_mean @ q.T / observation.noise, of_covariance, root)
 
 
+def mean_traction(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, prior: TractionPrior
+) -> FloatArray:
+    """Mean tractions [3, j] by data [m] under a known prior, whether or not they pull, without an operator for others:
+    L Wᵀ (1 + W Wᵀ)⁻¹ d.
+    """
+    response, reached = condensed(observation.whitened(support), data / observation.noise)
+    root = prior.strength * factors_on(nodes, support, prior.smoothness)
+    whitened = times(response, root)
+    of_data = covariance_root(whitened)
+    explained = whitened.T @ solve_root(of_data, solve_root(of_data, reached, transposed=True))
+    return _unwhitened(root, explained[:, None]).reshape(3, -1)
+
+
+def fit_mean(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: TractionPrior) -> TractionMean:
+    """Its mean alone, at a fraction of the cost and of the memory where data are fewer than tractions."""
+    root = prior.strength * factors_on(nodes, support, prior.smoothness)
+    whitened = times(observation.whitened(support), root)
+    return TractionMean(support, _unwhitened(root, posterior_operator(whitened)) / observation.noise)
+
+
 def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The same problem in no more data than it has unknowns, by QR: without the part of the data that none reaches."""
     m, _, k = response.shape
@@ -147,18 +176,38 @@ def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, Float
 
 
 def log_evidence(
-    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
+    observation: ObservationModel,
+    data: FloatArray,
+    nodes: Nodes,
+    support: BoolArray,
+    shape: Smoothness,
+    near: TractionPrior | None = None,
+    worth: float = -np.inf,
 ) -> tuple[float, TractionPrior]:
     """Log probability of data [m] if traction acts on a ``support`` [k], without what no support changes: under the
     prior of this shape with the strength that makes it largest, and that prior.
 
     Supports are compared each by its own strength: the same force on fewer nodes takes a greater pressure on each, so
-    that the strength of a wide contact would speak against all smaller ones.
+    that the strength of a wide contact would speak against all smaller ones. ``near``: the most probable prior of a
+    support or a shape that differs little, from which it is found in less time, and only roughly if it is not
+    ``worth`` so much.
     """
-    response, reached = condensed(*observation.whitened(support, data))
+    response, seen = observation.whitened(support), data / observation.noise
+    if near is not None:
+        whitened = times(response, factors_on(nodes, support, shape))
+        return _nearby(TriangularResponse.of(whitened, seen), shape, near, worth)
+    response, reached = condensed(response, seen)
     spectrum = Spectrum.of(times(response, factors_on(nodes, support, shape)), reached)
     strength = spectrum.choose(0.0, len(reached), "evidence")
     return spectrum.log_evidence(strength) + 0.5 * float(spectrum.y @ spectrum.y), TractionPrior(shape, strength)
+
+
+def _nearby(
+    response: TriangularResponse, shape: Smoothness, near: TractionPrior, worth: float = -np.inf
+) -> tuple[float, TractionPrior]:
+    """The same from a shear as strong as that of a prior nearby, for shear is what data show best."""
+    strength, log_probability = response.best(near.strength * near.smoothness.shear / shape.shear, worth)
+    return log_probability, TractionPrior(shape, strength)
 
 
 def choose_prior(
@@ -168,33 +217,58 @@ def choose_prior(
     support: BoolArray,
     criterion: Criterion = "evidence",
     first: Smoothness | None = None,
-    strength_alone: bool = False,
 ) -> TractionPrior:
     """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion.
 
-    ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept. A shear
-    smaller than any that data may choose is kept as well.
+    ``first``: the shape to begin with (None: the usual one).
     """
-    r, y = condensed(*observation.whitened(support, data))
-    whitened = data / observation.noise
-    rest, count = max(float(whitened @ whitened - y @ y), 0.0), int(np.isfinite(observation.noise).sum())
+    begun = choose_strength(observation, data, nodes, support, usual() if first is None else first, "evidence")
+    _, prior = most_probable(observation, data, nodes, support, begun)
+    if criterion == "evidence":
+        return prior
+    return choose_strength(observation, data, nodes, support, prior.smoothness, criterion)
 
-    def evaluate(shape: Smoothness, by: Criterion) -> tuple[float, float]:
-        spectrum = Spectrum.of(times(r, factors_on(nodes, support, shape)), y)
-        strength = spectrum.choose(rest, count, by)
-        return spectrum.log_evidence(strength), strength
 
-    best = usual() if first is None else first
-    if strength_alone:
-        return TractionPrior(best, evaluate(best, criterion)[1])
-    evidence = evaluate(best, "evidence")[0]
+def choose_strength(
+    observation: ObservationModel,
+    data: FloatArray,
+    nodes: Nodes,
+    support: BoolArray,
+    shape: Smoothness,
+    criterion: Criterion,
+) -> TractionPrior:
+    """A prior of a known shape with the strength that data [m] speak for by a criterion, of all that may be."""
+    seen = data / observation.noise
+    response, reached = condensed(observation.whitened(support), seen)
+    rest, count = max(float(seen @ seen - reached @ reached), 0.0), int(np.isfinite(observation.noise).sum())
+    spectrum = Spectrum.of(times(response, factors_on(nodes, support, shape)), reached)
+    return TractionPrior(shape, spectrum.choose(rest, count, criterion))
+
+
+def most_probable(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, near: TractionPrior
+) -> tuple[float, TractionPrior]:
+    """Log probability of data [m] by the most probable prior, as ``log_evidence`` has it, and that prior: from one
+    ``near`` it, property by property. A shear smaller than any that data may choose is kept.
+    """
+    response, seen = observation.whitened(support), data / observation.noise
+    m, _, j = response.shape
+    triangular = TriangularResponse.of(response.reshape(m, 3 * j), seen) if m > 3 * j else None
+
+    def judged(shape: Smoothness, near: TractionPrior, worth: float = -np.inf) -> tuple[float, TractionPrior]:
+        root = factors_on(nodes, support, shape)
+        if triangular is not None:
+            return _nearby(triangular.times(root), shape, near, worth)
+        return _nearby(TriangularResponse.of(times(response, root), seen), shape, near, worth)
+
+    evidence, prior = judged(near.smoothness, near)
     for name, values in choices().items():
-        for value in () if name == "shear" and best.shear < min(values) else values:
+        for value in () if name == "shear" and prior.smoothness.shear < min(values) else values:
             changed: dict[str, Any] = {name: value}
-            other = best._replace(**changed)
-            if other != best and (found := evaluate(other, "evidence")[0]) > evidence:
-                best, evidence = other, found
-    return TractionPrior(best, evaluate(best, criterion)[1])
+            other = prior.smoothness._replace(**changed)
+            if other != prior.smoothness:
+                evidence, prior = max((evidence, prior), judged(other, prior, evidence), key=itemgetter(0))
+    return evidence, prior
 
 
 def factors_on(nodes: Nodes, support: BoolArray, shape: Smoothness) -> FloatArray:

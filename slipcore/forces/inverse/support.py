@@ -8,6 +8,7 @@ is found so; how much comes from a fit on that support.
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,7 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convo
 
 from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.inverse.covariance import covariance_root, solve_root
-from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, condensed, fit, log_evidence
-from slipcore.forces.inverse.prior import Smoothness
+from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, condensed, log_evidence, mean_traction
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
@@ -56,67 +56,86 @@ def relevant_nodes(observation: ObservationModel, data: FloatArray, candidates: 
 
 
 def better_support(
-    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, first: SupportCandidate
 ) -> list[SupportCandidate]:
     """Supports that explain data [m] best, the most probable first and none much less probable than it, under priors
-    of this shape: among those that grow, shrink or close row by row from one, and those whose rim is then cut
-    where pressures are.
+    of the shape that suits the ``first``: among those that grow, shrink or close row by row from that, and those whose
+    rim is then cut where pressures are.
 
-    Behind the first the same supports stand again with pressure that falls to zero at their rim, if that is as
+    Behind the best the same supports stand again with pressure that falls to zero at their rim, if that is as
     probable: on a wide support a pressure that is as likely there as in the middle makes forces too large.
     """
-    near = observation.within(binary_dilation(support).ravel(), data)
-    judged = _judged([support], *near, nodes, shape)
-    best = judged[0]
+    judged, best = {first.support.tobytes(): first}, first
+    near = _Near.to(best, observation, data, nodes)
     for _ in range(SUPPORT.steps):
-        changed = [change(best.support) for change in STEPS]
-        others = [other for other in changed if other.any() and (other != best.support).any()]
-        judged += _judged(others, *near, nodes, shape)
-        before, best = best, max(judged, key=_probability)
+        for other in (change(best.support) for change in STEPS):
+            if other.any() and other.tobytes() not in judged:
+                judged[other.tobytes()] = near.judged(other, best.prior)
+        before, best = best, max(judged.values(), key=_probability)
         if best is before:
             break
-        near = observation.within(binary_dilation(best.support).ravel(), data)
-    judged += _judged([*cut(*near, nodes, best.support, shape)], *near, nodes, shape)
-    different = {each.support.tobytes(): each for each in judged}.values()
-    likely = _likely(different)
-    falling = _judged([each.support for each in likely], *near, nodes, shape._replace(falls=True))
+        near = _Near.to(best, observation, data, nodes)
+    wide = np.asarray(binary_dilation(best.support))
+    for other in near.cut(best.support, judged.get(wide.tobytes()) or near.judged(wide, best.prior)):
+        if other.tobytes() not in judged:
+            judged[other.tobytes()] = near.judged(other, best.prior, _least(best))
+            best = max(best, judged[other.tobytes()], key=_probability)
+    likely = _likely(judged.values())
+    falling = [near.judged(each.support, _falling(each.prior), _least(best)) for each in likely]
     return [likely[0], *(each for each in _likely([*likely, *falling]) if each is not likely[0])]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Near:
+    """What is to be explained, in no more data than nodes up to a row beside some support have tractions."""
+
+    observation: ObservationModel
+    data: FloatArray
+    nodes: Nodes
+
+    @classmethod
+    def to(cls, best: SupportCandidate, observation: ObservationModel, data: FloatArray, nodes: Nodes) -> "_Near":
+        return cls(*observation.within(binary_dilation(best.support).ravel(), data), nodes)
+
+    def judged(self, support: BoolArray, near: TractionPrior, worth: float = -np.inf) -> SupportCandidate:
+        """A support under the prior of the shape of one that is ``near``."""
+        shape = near.smoothness
+        found = log_evidence(self.observation, self.data, self.nodes, support.ravel(), shape, near, worth)
+        return SupportCandidate(support, *found)
+
+    def cut(self, support: BoolArray, widest: SupportCandidate) -> Iterator[BoolArray]:
+        """Supports [ny, nx] between one without its outermost row and the ``widest``, with a row more, by how strongly
+        their nodes are pressed in a fit on that: contacts end between nodes, and not alike on all sides.
+        """
+        least, wide = binary_erosion(support), widest.support
+        pressure = np.full(wide.shape, -np.inf)
+        pressure[wide] = mean_traction(self.observation, self.data, self.nodes, wide.ravel(), widest.prior)[2]
+        rim = np.flatnonzero(wide & ~least)
+        strongest = rim[np.argsort(-pressure.flat[rim], kind="stable")]
+        for count in np.unique(np.linspace(0, len(rim), SUPPORT.levels + 2)[1:-1].round().astype(int)):
+            other = least.copy()
+            other.flat[strongest[:count]] = True
+            if other.any():
+                yield other
+
+
+def _falling(prior: TractionPrior) -> TractionPrior:
+    return replace(prior, smoothness=prior.smoothness._replace(falls=True))
 
 
 def _likely(candidates: Iterable[SupportCandidate]) -> list[SupportCandidate]:
     """Those that are not much less probable than the most probable one, which comes first."""
     found = sorted(candidates, key=_probability, reverse=True)
-    least = found[0].log_probability + np.log(SUPPORT.least_probability)
-    return [each for each in found if each.log_probability >= least]
+    return [each for each in found if each.log_probability >= _least(found[0])]
 
 
-def _judged(
-    supports: list[BoolArray], observation: ObservationModel, data: FloatArray, nodes: Nodes, shape: Smoothness
-) -> list[SupportCandidate]:
-    return [SupportCandidate(each, *log_evidence(observation, data, nodes, each.ravel(), shape)) for each in supports]
+def _least(best: SupportCandidate) -> float:
+    """Log probability of what counts beside the best."""
+    return best.log_probability + float(np.log(SUPPORT.least_probability))
 
 
 def _probability(candidate: SupportCandidate) -> float:
     return candidate.log_probability
-
-
-def cut(
-    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, shape: Smoothness
-) -> Iterator[BoolArray]:
-    """Supports [ny, nx] between one without its outermost row and one with a row more, by how strongly their nodes are
-    pressed in a fit on the widest: contacts end between nodes, and not alike on all sides.
-    """
-    least, wide = binary_erosion(support), binary_dilation(support)
-    of_wide = fit(observation, nodes, wide.ravel(), log_evidence(observation, data, nodes, wide.ravel(), shape)[1])
-    pressure = np.full(support.shape, -np.inf)
-    pressure[wide] = of_wide.mean(data)[2]
-    rim = np.flatnonzero(wide & ~least)
-    strongest = rim[np.argsort(-pressure.flat[rim], kind="stable")]
-    for count in np.unique(np.linspace(0, len(rim), SUPPORT.levels + 2)[1:-1].round().astype(int)):
-        other = least.copy()
-        other.flat[strongest[:count]] = True
-        if other.any():
-            yield other
 
 
 def widened(nodes: BoolArray, by: int) -> BoolArray:

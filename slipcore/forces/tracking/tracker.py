@@ -7,9 +7,19 @@ from scipy.ndimage import binary_propagation, generate_binary_structure
 from scipy.special import softmax
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.inverse.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
+from slipcore.forces.inverse.fit import (
+    ObservationModel,
+    TractionFit,
+    TractionMean,
+    TractionPrior,
+    choose_prior,
+    choose_strength,
+    fit,
+    fit_mean,
+    most_probable,
+)
 from slipcore.forces.inverse.strength import Criterion
-from slipcore.forces.inverse.support import better_support, relevant_nodes, widened
+from slipcore.forces.inverse.support import SupportCandidate, better_support, relevant_nodes, widened
 from slipcore.forces.inverse.whole_lattice import WholeLattice, whole_lattice
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray
@@ -21,13 +31,13 @@ EDGES_AND_CORNERS = generate_binary_structure(2, 2)
 class Key:
     """A frame at which the contact was sought, and the fit that holds until markers have moved on.
 
-    ``others``: fits on other contacts that data speak for, with their probabilities.
+    ``others``: mean tractions on other contacts that data speak for, with the probabilities of these.
     """
 
     observation: ObservationModel
     data: FloatArray
     fit: TractionFit
-    others: tuple[tuple[float, TractionFit], ...] = ()
+    others: tuple[tuple[float, TractionMean], ...] = ()
 
     def holds(self, observation: ObservationModel, data: FloatArray) -> bool:
         """Whether a frame sees the same markers and differs by little more than the noise of both."""
@@ -59,51 +69,54 @@ class Tracker:
     ) -> "Tracker":
         """Begin with a frame, which chooses the prior; ``lattice``: one made before, where depth is seen."""
         nodes, count = sensor.nodes, len(sensor.response)
-        if sensor.sees_depth:
-            if lattice is None:
-                noise = float(np.min(observation.noise[:count]))
-                lattice = lattice_of(sensor, noise, float(np.sqrt(np.mean(data[:count] ** 2))))
-            support = _pressed(sensor, lattice, observation, data)
-        else:
+        everything = (observation, data, nodes)
+        if not sensor.sees_depth:
             support = relevant_nodes(observation, data, np.ones(nodes.grid.shape, dtype=bool))
-        prior = choose_prior(observation, data, nodes, support.ravel(), criterion, sensor.first_shape)
-        key = Key(observation, data, fit(observation, nodes, support.ravel(), prior))
-        begun = cls(sensor, criterion, prior, key, lattice)
-        return begun if lattice is not None else begun._sought_in_the_plane(observation, data)
+            prior = choose_prior(*everything, support.ravel(), first=sensor.first_shape)
+            return cls._sought_in_the_plane(sensor, criterion, observation, data, support, prior)
+        if lattice is None:
+            noise = float(np.min(observation.noise[:count]))
+            lattice = lattice_of(sensor, noise, float(np.sqrt(np.mean(data[:count] ** 2))))
+        support = _pressed(sensor, lattice, observation, data)
+        prior = choose_prior(*everything, support.ravel(), criterion, sensor.first_shape)
+        found = fit(observation, nodes, support.ravel(), prior)
+        return cls(sensor, criterion, prior, Key(observation, data, found), lattice)
 
     def at(self, observation: ObservationModel, data: FloatArray) -> "Tracker":
         """Go on to another frame; the contact is sought again only where markers have moved on."""
         if self.key.holds(observation, data):
             return self
         if self.lattice is None:
-            return self._sought_in_the_plane(observation, data)
-        support = _pressed(self.sensor, self.lattice, observation, data)
-        return self._on(observation, data, support, self.prior)
+            before = self.key.fit.support.reshape(self.sensor.nodes.grid.shape)
+            return self._sought_in_the_plane(self.sensor, self.criterion, observation, data, before, self.prior)
+        support = _pressed(self.sensor, self.lattice, observation, data).ravel()
+        found = fit(observation, self.sensor.nodes, support, self.prior)
+        return replace(self, key=Key(observation, data, found))
 
-    def _sought_in_the_plane(self, observation: ObservationModel, data: FloatArray) -> "Tracker":
-        """With a better contact for a frame, and before it the frame's own prior: one that allows for the shear of
-        another frame lets shear stand for pressure, and the contact shrinks to where it would.
-        """
-        nodes, before = self.sensor.nodes, self.key.fit.support
-        prior = choose_prior(observation, data, nodes, before, self.criterion, self.prior.smoothness)
-        shape = prior.smoothness
-        candidates = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), shape)
-        support = candidates[0].support
-        prior = choose_prior(observation, data, nodes, support.ravel(), self.criterion, shape, strength_alone=True)
-        probability = softmax([each.log_probability for each in candidates])
-        fits = [fit(observation, nodes, each.support.ravel(), each.prior) for each in candidates[1:]]
-        return self._on(observation, data, support, prior, tuple(zip(probability[1:], fits, strict=True)))
-
-    def _on(
-        self,
+    @classmethod
+    def _sought_in_the_plane(
+        cls,
+        sensor: SensorResponse,
+        criterion: Criterion,
         observation: ObservationModel,
         data: FloatArray,
-        support: BoolArray,
+        before: BoolArray,
         prior: TractionPrior,
-        others: tuple[tuple[float, TractionFit], ...] = (),
     ) -> "Tracker":
-        found = fit(observation, self.sensor.nodes, support.ravel(), prior)
-        return replace(self, prior=prior, key=Key(observation, data, found, others))
+        """With a better contact for a frame than that ``before`` [ny, nx], and first the frame's own prior: one that
+        allows for the shear of another frame lets shear stand for pressure, and the contact shrinks to where it would.
+        """
+        everything = (observation, data, sensor.nodes)
+        first = SupportCandidate(before, *most_probable(*everything, before.ravel(), prior))
+        best, *others = better_support(*everything, first)
+        probability = softmax([each.log_probability for each in (best, *others)])
+        support, prior = best.support.ravel(), best.prior
+        if criterion != "evidence":
+            prior = choose_strength(*everything, support, prior.smoothness, criterion)
+        means = [fit_mean(observation, sensor.nodes, each.support.ravel(), each.prior) for each in others]
+        found = fit(observation, sensor.nodes, support, prior)
+        key = Key(observation, data, found, tuple(zip(probability[1:], means, strict=True)))
+        return cls(sensor, criterion, prior, key, None)
 
 
 def lattice_of(sensor: SensorResponse, noise: float, typical: float) -> WholeLattice:

@@ -5,7 +5,14 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from slipcore.forces.inverse.covariance import covariance_root, posterior, solve_root
+from slipcore.forces.inverse.covariance import (
+    covariance_root,
+    posterior,
+    posterior_operator,
+    solve_root,
+    triangles_root,
+)
+from slipcore.forces.inverse.nearby_strength import TriangularResponse
 from slipcore.forces.inverse.strength import Spectrum
 
 
@@ -20,6 +27,16 @@ def test_the_root_is_that_of_noise_and_unknowns_and_is_solved_with_either_way(m:
     np.testing.assert_allclose(root.T @ root, np.eye(m) + spread @ spread.T, rtol=1e-13, atol=1e-12)
     for transposed, factor in ((False, root), (True, root.T)):  # condition 10 at most
         np.testing.assert_allclose(factor @ solve_root(root, data, transposed=transposed), data, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1, 5, 90])
+def test_the_root_of_a_triangle_is_that_of_its_square_and_the_unit_matrix(size: int) -> None:
+    upper = np.triu(np.random.default_rng(size).standard_normal((size, size)))
+    before = upper.copy()
+    root = triangles_root(upper)
+    np.testing.assert_array_equal(upper, before)
+    np.testing.assert_array_equal(root, np.triu(root))
+    np.testing.assert_allclose(root.T @ root, np.eye(size) + upper.T @ upper, rtol=1e-13, atol=1e-12)
 
 
 def test_what_is_small_beside_the_largest_keeps_its_digits() -> None:
@@ -39,6 +56,7 @@ def test_the_posterior_is_that_of_noise_and_unknowns_seen_or_not(m: int, p: int)
     covariance = np.linalg.inv(np.eye(p) + response.T @ response)  # of condition 300 at most
     np.testing.assert_allclose(root @ root.T, covariance, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(operator, covariance @ response.T, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(posterior_operator(response), operator, rtol=0.0, atol=1e-12)
 
 
 def test_a_posterior_loses_the_digits_of_a_condition_number_and_not_of_its_square() -> None:
@@ -54,7 +72,14 @@ def test_a_posterior_loses_the_digits_of_a_condition_number_and_not_of_its_squar
     np.testing.assert_allclose(np.linalg.norm(operator @ left, axis=0), gain, rtol=1e-5)
 
 
-@pytest.mark.parametrize("do", [covariance_root, lambda matrix: Spectrum.of(matrix, matrix[0])])
+@pytest.mark.parametrize(
+    "do",
+    [
+        covariance_root,
+        lambda matrix: Spectrum.of(matrix, matrix[0]),
+        lambda matrix: TriangularResponse.of(matrix, matrix[0]).evidence(1.0),
+    ],
+)
 def test_other_threads_go_on_meanwhile(do: Callable[[np.ndarray], object]) -> None:
     size, ticks = 300, 0
     while ticks < 10:  # where the interpreter is kept there are two at most, however much there is to do

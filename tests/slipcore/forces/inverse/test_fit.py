@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.forces.inverse.fit import ObservationModel, choose_prior
+from slipcore.forces.inverse.fit import (
+    ObservationModel,
+    TractionPrior,
+    choose_prior,
+    choose_strength,
+    fit,
+    fit_mean,
+    log_evidence,
+    mean_traction,
+    most_probable,
+)
 from slipcore.forces.inverse.prior import Smoothness, factors, usual
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
@@ -49,11 +59,11 @@ def test_as_many_data_as_tractions_determine_them_and_one_fewer_does_not(fewer: 
 
 def test_a_strength_is_found_as_it_was_drawn_and_scales_with_its_data(nodes: Nodes, support: BoolArray) -> None:
     observation, data = drawn(nodes, support, 0.03, usual())
-    found = choose_prior(observation, data, nodes, support, first=usual(), strength_alone=True)
+    found = choose_strength(observation, data, nodes, support, usual(), "evidence")
     assert found.smoothness == usual()
     assert found.strength == pytest.approx(0.03, rel=0.25)
     larger = replace(observation, noise=5.0 * observation.noise)
-    scaled = choose_prior(larger, 5.0 * data, nodes, support, first=usual(), strength_alone=True)
+    scaled = choose_strength(larger, 5.0 * data, nodes, support, usual(), "evidence")
     assert scaled.strength == pytest.approx(5.0 * found.strength, rel=1e-3)
 
 
@@ -62,6 +72,30 @@ def test_a_shape_that_is_known_has_the_strength_that_the_whole_choice_gives_it(
 ) -> None:
     observation, data = drawn(nodes, support, 0.03, usual()._replace(shear=0.1))
     chosen = choose_prior(observation, data, nodes, support)
-    again = choose_prior(observation, data, nodes, support, first=chosen.smoothness, strength_alone=True)
+    again = choose_strength(observation, data, nodes, support, chosen.smoothness, "evidence")
     assert chosen.smoothness != usual()
-    assert again == chosen
+    assert again.strength == pytest.approx(chosen.strength, rel=0.01)
+
+
+def test_the_most_probable_prior_is_found_from_another(nodes: Nodes, support: BoolArray) -> None:
+    """With its log probability: that of the same prior by singular values, and no less than any other's."""
+    observation, data = drawn(nodes, support, 0.03, usual()._replace(shear=0.1))
+    near = TractionPrior(usual(), 0.01)
+    found, prior = most_probable(observation, data, nodes, support, near)
+    assert prior.smoothness == choose_prior(observation, data, nodes, support).smoothness
+    exact = log_evidence(observation, data, nodes, support, prior.smoothness)
+    assert found == pytest.approx(exact[0], abs=0.03)
+    for shape in (usual(), prior.smoothness._replace(pressure=3.0), prior.smoothness._replace(traction=6.0)):
+        assert log_evidence(observation, data, nodes, support, shape)[0] <= found + 0.03
+
+
+@pytest.mark.parametrize("seen", [400, 40])
+def test_a_mean_alone_is_that_of_the_whole_fit(nodes: Nodes, support: BoolArray, seen: int) -> None:
+    """Of more data than tractions, and of fewer."""
+    observation, data = drawn(nodes, support, 0.03, usual())
+    observation = ObservationModel(observation.response[:seen], observation.noise[:seen])
+    prior = TractionPrior(usual(), 0.03)
+    whole = fit(observation, nodes, support, prior)
+    np.testing.assert_allclose(fit_mean(observation, nodes, support, prior).operator, whole.operator, atol=1e-9)
+    alone = mean_traction(observation, data[:seen], nodes, support, prior)
+    np.testing.assert_allclose(alone, whole.mean(data[:seen]), atol=1e-9)

@@ -9,7 +9,7 @@ from slipcore.forces.defaults import SUPPORT
 from slipcore.forces.inverse.covariance import covariance_root
 from slipcore.forces.inverse.fit import ObservationModel, condensed, log_evidence
 from slipcore.forces.inverse.prior import factors, usual
-from slipcore.forces.inverse.support import better_support, node_relevance, relevant_nodes, widened
+from slipcore.forces.inverse.support import SupportCandidate, better_support, node_relevance, relevant_nodes, widened
 from slipcore.forces.operator.nodes import Nodes
 
 NODES = 16
@@ -83,6 +83,11 @@ def directly_seen(loaded: np.ndarray, noise: float) -> tuple[ObservationModel, n
     return ObservationModel(np.eye(3 * count).reshape(3 * count, 3, count), np.full(3 * count, noise)), data
 
 
+def first(observation: ObservationModel, data: np.ndarray, support: np.ndarray) -> SupportCandidate:
+    """A support from which better ones are sought."""
+    return SupportCandidate(support, *log_evidence(observation, data, LATTICE, support.ravel(), usual()))
+
+
 def test_a_support_is_judged_by_the_strength_that_speaks_for_it_most() -> None:
     """By the density of the data themselves: its maximum over strengths, but for what no support changes."""
     observation, data = directly_seen(np.ones((9, 8), dtype=bool), 0.05)
@@ -111,7 +116,7 @@ def test_a_contact_that_is_cut_on_one_side_alone_is_found(beside: int) -> None:
     observation, data = directly_seen(loaded, 0.02)
     wide = loaded.copy()
     wide[2:6, 5 : 5 + beside] = True
-    found = better_support(observation, data, LATTICE, wide, usual())[0].support
+    found = better_support(observation, data, LATTICE, first(observation, data, wide))[0].support
     assert found[loaded].all()
     assert (found & ~loaded).sum() <= 4 * (beside - 1) + 1
 
@@ -119,7 +124,8 @@ def test_a_contact_that_is_cut_on_one_side_alone_is_found(beside: int) -> None:
 def test_supports_that_data_cannot_distinguish_are_all_returned() -> None:
     loaded = np.zeros((9, 8), dtype=bool)
     loaded[2:6, 2:5] = True
-    clear, blurred = (better_support(*directly_seen(loaded, noise), LATTICE, loaded, usual()) for noise in (0.01, 0.4))
+    seen = [directly_seen(loaded, noise) for noise in (0.01, 0.4)]
+    clear, blurred = (better_support(*each, LATTICE, first(*each, loaded)) for each in seen)
     assert len({each.support.tobytes() for each in clear}) == 1
     assert len({each.support.tobytes() for each in blurred}) > 2
     assert len({(each.support.tobytes(), each.prior.smoothness) for each in blurred}) == len(blurred)
@@ -146,6 +152,6 @@ def test_pressure_that_falls_to_a_rim_speaks_for_a_prior_that_does(falls: bool) 
         for each in (False, True)
     )
     assert (log_falling > log_usual) == falls
-    found = better_support(observation, data, LATTICE, loaded, usual())
+    found = better_support(observation, data, LATTICE, first(observation, data, loaded))
     assert not found[0].prior.smoothness.falls
     assert max(found, key=lambda each: each.log_probability).prior.smoothness == shape
