@@ -15,11 +15,14 @@ Places = NDArray[np.int64]
 
 _AT_LIMIT, _REST = WORLD.at_limit, WORLD.rest
 
+NONE = np.zeros(0)
+
 
 class Pad(NamedTuple):
     """Bristles at ``x``, ``y`` [k] m; ``influence`` [o, 3]: displacement (m) along x by 1 N along x on another bristle,
     along y by 1 N along y, and along either by 1 N along the other. The place of a bristle less that of the loaded one,
-    plus ``same``, is the row of ``influence``. ``pressing``: a³ over the normal force, m³/N (Hertz).
+    plus ``same``, is the row of ``influence``. ``pressing``: a³ over the normal force, m³/N (Hertz). Under a measured
+    pressure in place of Hertz's: the ``share`` [k] of the normal force on each bristle, and the ``depth`` [k] m by 1 N.
     """
 
     x: FloatArray
@@ -28,6 +31,8 @@ class Pad(NamedTuple):
     influence: FloatArray
     same: int
     pressing: float
+    share: FloatArray = NONE
+    depth: FloatArray = NONE
 
 
 class TouchingBristles(NamedTuple):
@@ -53,6 +58,9 @@ class Bristles(NamedTuple):
 class Steps(NamedTuple):
     """How to go on: ``number`` of steps of ``length`` s, ``sweeps`` over the bristles in each; ``lag`` of the gripper
     and ``gel_time`` of the gel, s; ``mass`` kg, ``inertia`` kg m².
+
+    Where the object moves across the surface and tilts, too, ``half_width`` m: from its centre to a finger, whose ball
+    has the radius ``sphere`` m and whose gel the ``modulus`` E*, Pa; 0 where it does not.
     """
 
     number: int
@@ -62,6 +70,9 @@ class Steps(NamedTuple):
     gel_time: float
     mass: float
     inertia: float
+    half_width: float = 0.0
+    sphere: float = 0.0
+    modulus: float = 0.0
 
 
 @compiled
@@ -75,57 +86,146 @@ def advance(
     motion: FloatArray,
     bristles: Bristles,
 ) -> None:
-    """Go on in place, with the load [2, 3] (N, N, N·m) changing evenly from its first row to its second.
+    """Go on in place, with the load [2, 6] changing evenly from its first row to its second.
 
-    Of each finger: ``friction`` [f, k] (coefficient), ``command`` and ``normal`` force [f] N, and its ``bristles``; of
-    the object: ``motion`` [2, 3] (pose; velocity). The second finger faces the first: y and yaw are turned round in its
-    frame.
+    Of each finger: ``friction`` [f, k] (coefficient), ``command`` and ``normal`` force [f] N of the gripper, and its
+    ``bristles``; of the object: ``motion`` [2, 6] (pose; velocity) along x and y, about z, along z, about x and y (m,
+    m, rad, m, rad, rad; the load in N and N·m). The second finger faces the first: all but x and what turns about it
+    are turned round in its frame.
     """
     fingers = normal.shape[0]
     patches = [TouchingBristles(np.zeros(0, np.int64), np.zeros((3, 0, 0)), np.zeros((2, 0))) for _ in range(fingers)]
     for step in range(steps.number):
-        resultant = np.zeros(3)
+        resultant = np.zeros(6)
         motion[0] += steps.length * motion[1]
         target = motion[0] + steps.gel_time * motion[1]
         for f in range(fingers):
             side = 1.0 - 2.0 * f
             normal[f] += (command[f] - normal[f]) * -math.expm1(-steps.length / steps.lag)
-            limit = friction[f] * pressures(pad, normal[f])
-            if (limit > 0.0).sum() != patches[f].which.size:  # circles about one centre differ by their size alone
+            seat = seat_of(pad, normal[f], target, side, steps.half_width, steps.sphere, steps.modulus)
+            limit = friction[f] * pressures(pad, seat.normal, seat.x, seat.y)
+            if not are_these(limit, patches[f].which):
                 leave(limit, bristles.force[f], bristles.offset[f], bristles.slips[f])
                 patches[f] = patch_of(pad, np.flatnonzero(limit > 0.0), bristles.force[f])
-            pose = target * np.array([1.0, side, side])
-            settle(pad, patches[f], limit, pose, bristles.force[f], bristles.offset[f], bristles.slips[f], steps.sweeps)
-            resultant += on_object(pad, patches[f].which, bristles.force[f], side)
+            settle(
+                pad,
+                patches[f],
+                limit,
+                seat.pose,
+                bristles.force[f],
+                bristles.offset[f],
+                bristles.slips[f],
+                steps.sweeps,
+            )
+            sheared = on_object(pad, patches[f].which, bristles.force[f], side)
+            resultant[:3] += sheared
+            if steps.half_width > 0.0:
+                resultant += across(sheared, seat.normal, target, side, steps.half_width, steps.sphere)
         share = (step + 1.0) / steps.number
         driving = load[0] + share * (load[1] - load[0]) - resultant
         motion[1, :2] += steps.length / steps.mass * driving[:2]
         motion[1, 2] += steps.length / steps.inertia * driving[2]
+        if steps.half_width > 0.0:
+            motion[1, 3] += steps.length / steps.mass * driving[3]
+            motion[1, 4:] += steps.length / steps.inertia * driving[4:]
+
+
+class Seat(NamedTuple):
+    """How an object sits on a finger, in its frame: the ``pose`` [3] (m, m, rad) of its surface there, the ``normal``
+    force, N, and the middle of the contact at ``x``, ``y`` m.
+    """
+
+    pose: FloatArray
+    normal: float
+    x: float
+    y: float
 
 
 @compiled
-def pressures(pad: Pad, normal: float) -> FloatArray:
-    """Normal force on each bristle, [k] N, under ``normal`` N in all: Hertz's pressure at its place."""
+def seat_of(
+    pad: Pad, normal: float, pose: FloatArray, side: float, half_width: float, sphere: float, modulus: float
+) -> Seat:
+    """The seat of an object at ``pose`` [6] on a finger that the gripper presses with ``normal`` N.
+
+    A tilt moves its surface along the finger's, and the contact on the ball, by the angle times ``half_width`` and
+    ``sphere``. The jaws move together, so that the gel is relieved by how far the object is away, with Hertz's
+    stiffness dF/dδ = 2aE* (Johnson, Contact Mechanics, 1985, eq. 4.23).
+    """
+    surface = np.array([pose[0], side * pose[1], side * pose[2]])
+    if half_width == 0.0:
+        return Seat(surface, normal, 0.0, 0.0)
+    about_x, about_y = pose[4], side * pose[5]
+    surface[0] -= half_width * about_y
+    surface[1] += half_width * about_x
+    stiffness = 2.0 * modulus * (pad.pressing * max(normal, 0.0)) ** (1.0 / 3.0)
+    return Seat(surface, max(normal - stiffness * side * pose[3], 0.0), sphere * about_y, -sphere * about_x)
+
+
+@compiled
+def across(
+    sheared: FloatArray, normal: float, pose: FloatArray, side: float, half_width: float, sphere: float
+) -> FloatArray:
+    """What a finger that is ``sheared`` [3] by an object at ``pose`` [6] bears beside that, [6] N and N·m.
+
+    The moments of its shear about the object's centre, and its normal force, which acts along the tilted surface's
+    normal where the contact has moved to.
+    """
+    about_x, about_y = pose[4], pose[5]
+    lever = normal * (half_width + sphere)
+    return np.array(
+        [
+            -normal * side * about_y,
+            side * normal * about_x,
+            0.0,
+            -side * normal,
+            side * half_width * sheared[1] + lever * about_x,
+            -side * half_width * sheared[0] + lever * about_y,
+        ]
+    )
+
+
+@compiled
+def are_these(limit: FloatArray, which: Places) -> bool:
+    """Whether just the bristles of these numbers have a limit above 0."""
+    found = 0
+    for k in range(limit.size):
+        if limit[k] > 0.0:
+            if found == which.size or which[found] != k:
+                return False
+            found += 1
+    return found == which.size
+
+
+@compiled
+def pressures(pad: Pad, normal: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
+    """Normal force on each bristle, [k] N, under ``normal`` N in all: the measured share, or Hertz's pressure about
+    (``x``, ``y``) m.
+    """
     height = np.zeros(pad.x.size)
     if normal <= 0.0:
         return height
+    if pad.share.size:
+        return normal * pad.share
     square = (pad.pressing * normal) ** (2.0 / 3.0)
     for k in range(height.size):
-        height[k] = math.sqrt(max(1.0 - (pad.x[k] ** 2 + pad.y[k] ** 2) / square, 0.0))
+        height[k] = math.sqrt(max(1.0 - ((pad.x[k] - x) ** 2 + (pad.y[k] - y) ** 2) / square, 0.0))
     total = height.sum()
     return height * (normal / total) if total > 0.0 else height
 
 
 @compiled
-def depths(pad: Pad, normal: float, sphere: float) -> FloatArray:
-    """Normal displacement of the surface, [k] m, under a ball of radius ``sphere`` m and ``normal`` N.
+def depths(pad: Pad, normal: float, sphere: float, x: float = 0.0, y: float = 0.0) -> FloatArray:
+    """Normal displacement of the surface, [k] m, under a ball of radius ``sphere`` m at (``x``, ``y``) m and ``normal``
+    N, or by the measured pressure.
 
     Johnson, Contact Mechanics (1985), eq. 3.42.
     """
+    if pad.share.size:
+        return normal * pad.depth
     square = (pad.pressing * normal) ** (2.0 / 3.0)
     depth = np.zeros(pad.x.size)
     for k in range(depth.size if square > 0.0 else 0):
-        r2 = pad.x[k] ** 2 + pad.y[k] ** 2
+        r2 = (pad.x[k] - x) ** 2 + (pad.y[k] - y) ** 2
         if r2 <= square:
             depth[k] = (square - 0.5 * r2) / sphere
         else:

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.control import __main__ as control
 from benchmarks.control.__main__ import campaign, episode
-from benchmarks.control.episodes import FRAME, START, Episode, least_force, run, world_of
+from benchmarks.control.episodes import FRAME, START, Episode, Task, least_force, run, world_of
 from benchmarks.control.outcomes import SIGNATURES, outcome_of, scores
 from benchmarks.control.strategies import (
     CONTROLLERS,
@@ -21,7 +21,8 @@ from benchmarks.control.strategies import (
     model_of,
     settings_of,
 )
-from benchmarks.control.tasks import ALL, LIFT, LIFTS, PAPER, STEP, TASKS, lift
+from benchmarks.control.tasks import ALL, LIFT, LIFTS, PAPER, STEP, TASKS, lift, on_table, rise
+from slipcore.contact import reduced
 from slipcore.contact.reduced import GRAVITY, Load
 from stiction_client import Contact, GraspController, Observation
 
@@ -34,6 +35,24 @@ def test_the_least_force_is_the_limit_surface_s() -> None:
     force = least_force(world, Load(0.1, moment=2e-3))
     arm = float(Contact.round(math.pi * world.contact(5.0).contact_radius ** 2, at_force=5.0).arm(force))
     assert math.hypot(0.981, 2e-3 / arm) == pytest.approx(0.45 * force, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["known", "unknown"])
+def test_an_object_that_is_free_to_tilt_is_held_beside_its_centre(name: str) -> None:
+    """Two fingers, 4 cm apart, lift 200 g whose centre is 5 mm nearer to one of them, and are pushed at from there."""
+
+    def load(time: float) -> Load:
+        table = on_table(time)
+        push = 0.3 * rise(time, 3.0, 0.5)
+        return Load(0.2, table, moment=1e-3 * (1.0 - table), across=push, tilting=(0.0, 5e-3 * 0.2 * GRAVITY))
+
+    task = Task("beside its centre", (0.45, 0.45), 4.5, load)
+    world = dataclasses.replace(world_of(task, 3), width=0.04)
+    found = episode(task, name, 3, world)
+    assert found.time[-1] == pytest.approx(4.5)
+    assert found.slipped.max() < 1e-3
+    state = reduced.step(world, reduced.init(world, 5.0), 5.0, load(4.5), 0.5)
+    assert abs(state.pose[5]) > 1e-4  # and it does tilt
 
 
 def test_two_fingers_share_the_load() -> None:

@@ -123,31 +123,32 @@ def advanced(fingers: int, command: float, motion: np.ndarray, steps: Steps = ST
     """After some steps under a load that grows from nothing to (4, -2, 1); each finger has one bristle."""
     found, held = motion.copy(), np.full(fingers, normal)
     bristles = Bristles(*(np.stack([each] * fingers) for each in apart(1)))
-    load = np.array([[0.0, 0.0, 0.0], [4.0, -2.0, 1.0]])
+    load = np.array([[0.0] * 6, [4.0, -2.0, 1.0, 0.0, 0.0, 0.0]])
     kernel.advance(ALONE, steps, np.ones((fingers, 1)), np.full(fingers, command), load, held, found, bristles)
     return found, held, bristles
 
 
 def test_a_gripper_follows_its_command_with_its_lag() -> None:
-    _, normal, _ = advanced(1, 10.0, np.zeros((2, 3)), normal=2.0)
+    _, normal, _ = advanced(1, 10.0, np.zeros((2, 6)), normal=2.0)
     assert normal[0] == pytest.approx(10.0 - 8.0 * np.exp(-0.5))
 
 
 def test_what_no_finger_holds_is_driven_by_the_load() -> None:
     """Two steps of which the first has half of the load: velocities by mass and inertia, places by these."""
-    found, _, _ = advanced(1, 0.0, np.array([[0.0] * 3, [1.0, 0.0, 0.0]]), STEPS._replace(number=2))
+    found, _, _ = advanced(1, 0.0, np.array([[0.0] * 6, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]), STEPS._replace(number=2))
     change = 0.1 * np.array([2.0, -1.0, 2.0])
-    np.testing.assert_allclose(found[1], np.array([1.0, 0.0, 0.0]) + 0.5 * change + change)
-    np.testing.assert_allclose(found[0], 0.1 * np.array([2.0, 0.0, 0.0]) + 0.05 * change)
+    np.testing.assert_allclose(found[1, :3], np.array([1.0, 0.0, 0.0]) + 0.5 * change + change)
+    np.testing.assert_allclose(found[0, :3], 0.1 * np.array([2.0, 0.0, 0.0]) + 0.05 * change)
+    assert not found[:, 3:].any()
 
 
 def test_two_fingers_that_hold_hold_back_alike() -> None:
     """Both stick with 8 N before them; the object goes on by (0.1, 0.2), and each meets (0.05, 0.05) N."""
-    motion = np.zeros((2, 3))
+    motion = np.zeros((2, 6))
     start, normal, bristles = advanced(2, 8.0, motion, normal=8.0)
-    load, found = np.zeros((2, 3)), np.array([[0.0] * 3, [1.0, 2.0, 0.0]])
+    load, found = np.zeros((2, 6)), np.array([[0.0] * 6, [1.0, 2.0, 0.0, 0.0, 0.0, 0.0]])
     kernel.advance(ALONE, STEPS, np.ones((2, 1)), np.full(2, 8.0), load, normal, found, bristles)
-    np.testing.assert_allclose(found[0], [0.1, 0.2, 0.0])
+    np.testing.assert_allclose(found[0], [0.1, 0.2, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(bristles.force[:, 0], [[0.05, 0.05], [0.05, -0.05]])  # y is turned round
-    np.testing.assert_allclose(found[1], np.array([1.0, 2.0, 0.0]) - 0.1 / 2.0 * np.array([0.1, 0.1, 0.0]))
-    assert start.shape == (2, 3)
+    np.testing.assert_allclose(found[1, :3], np.array([1.0, 2.0, 0.0]) - 0.1 / 2.0 * np.array([0.1, 0.1, 0.0]))
+    assert start.shape == (2, 6)
