@@ -17,7 +17,7 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.contact.random_scenes import random_scene
-from slipcore.contact.defaults import ACCURACY, PROBE
+from slipcore.contact.defaults import ACCURACY
 from slipcore.contact.errors import InfeasibleLoad, NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress
@@ -25,8 +25,9 @@ from slipcore.contact.scene import Scene
 from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers import requests as runs
 from slipcore.contact.tiers.accuracy import Refined, difference, simulate_to
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
+from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.contact.tiers.price import Sizes
+from slipcore.contact.tiers.probe import probe
 
 ASKED = (0.1, 0.05, 0.03)
 """By turns."""
@@ -87,7 +88,7 @@ def kinds_of(seed: int) -> tuple[str, ...]:
 def expected_work(seed: int) -> float:
     """What a scene should cost, beside others: its load steps on a usual grid, by what its effects make of them."""
     plan = scene_of(seed).plan(seed)
-    size = Sizes(plan, PROBE.room * contact_reach(plan)).of(USUAL)
+    size = Sizes(plan, probe(plan)).of(USUAL)
     return size.work(ACCURACY.overhead_cells) * float(np.prod([DEARER.get(kind, 1.0) for kind in kinds_of(seed)]))
 
 

@@ -18,8 +18,9 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress
 from slipcore.contact.tiers import requests
 from slipcore.contact.tiers.accuracy import simulate_to
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
+from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.contact.tiers.price import Pace, Size, Sizes
+from slipcore.contact.tiers.probe import probe
 from slipcore.frames import GraspLog
 
 CELLS = (12, 20, 32, 52, 84)
@@ -32,7 +33,7 @@ ASKED = 0.03
 def ladder(name: str) -> tuple[tuple[Size, float], ...]:
     """Sizes of a scene's runs on ever more cells, and the processor seconds they take."""
     plan = SCENES[name].plan()
-    sizes, found = Sizes(plan, of_contact.PROBE.room * contact_reach(plan)), []
+    sizes, found = Sizes(plan, probe(plan)), []
     for cells in CELLS:
         fidelity, began = Fidelity(cells, 1, 1e-3, aligned=False), process_time()
         run(plan, fidelity)

@@ -295,7 +295,7 @@ class EdgeDefaults(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeDefaults(Options):
-    """How far a contact reaches, found on a coarse grid (``tiers/boundary_elements.py``)."""
+    """How far a contact reaches, found on a coarse grid (``tiers/probe.py``)."""
 
     cells: Annotated[int, Option(8, 1024, "cells", "finds the edge to 4 %")] = 48
     tolerance: Annotated[float, Option(1e-8, 0.5, "-", "below the discretisation error")] = 1e-3

@@ -16,7 +16,8 @@ from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.simulate import observe
 from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.accuracy import Difference, difference
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
+from slipcore.contact.tiers.boundary_elements import Fidelity, run
+from slipcore.contact.tiers.probe import contact_reach
 from slipcore.errors import SlipcoreError
 from slipcore.frames import GraspLog
 

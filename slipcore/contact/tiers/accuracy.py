@@ -10,10 +10,11 @@ from slipcore.contact.errors import NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.solver.warm_up import load_kernels
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
+from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.contact.tiers.difference import Difference as Difference
 from slipcore.contact.tiers.difference import difference as difference
 from slipcore.contact.tiers.extrapolation import grid_error, on_finer
+from slipcore.contact.tiers.probe import probe
 from slipcore.contact.tiers.requests import OutOfTime, Runs
 from slipcore.contact.tiers.sampling import frame_times
 from slipcore.errors import InvalidInput
@@ -91,12 +92,12 @@ class _AccuracySearch:
 
     def __init__(self, plan: Plan, target: float, budget: float, progress: Progress, *, every: bool = False) -> None:
         load_kernels()  # no part of the budget, nor of the first run's pace
-        reach = contact_reach(plan)
-        self.plan, self.target, self.every = _sampled(plan, reach), target, every
+        contact = probe(plan)
+        self.plan, self.target, self.every = _sampled(plan, contact.reach), target, every
         self.limited = bool(np.isfinite(budget))
         self.shows_steps = len(frame_times(self.plan)) >= ACCURACY.fewest_frames
         self.rarely = _half_the_frames(self.plan)
-        self.runs = Runs(PROBE.room * reach, budget, progress, strict=not every)
+        self.runs = Runs(contact, budget, progress, strict=not every)
         coarsest, second = self.least()
         self.runs.expect(self.plan, (coarsest, *self.ahead(second, ACCURACY.coarsest_cells, None)))
 
@@ -117,7 +118,7 @@ class _AccuracySearch:
         if self.target == 0.0:
             return (following,)
         error = ACCURACY.coarsest_error if grid is None else grid.largest
-        growth = max(error / ((1.0 - ACCURACY.step_share) * self.target), 1.0)
+        growth = max(error / ((1.0 - ACCURACY.step_share) * self.target), 1.0) ** (1.0 / ACCURACY.usual_ratio_order)
         enough = _even(min(growth * cells, ACCURACY.finest_cells))
         return (following, replace(following, cells=enough)) if enough > following.cells else (following,)
 

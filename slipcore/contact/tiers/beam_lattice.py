@@ -18,7 +18,8 @@ from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.tiers import boundary_elements
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.probe import contact_reach
 from slipcore.contact.tiers.sampling import sensor_grid
 from slipcore.frames import FloatArray, GraspLog
 

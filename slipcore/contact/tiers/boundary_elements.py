@@ -4,20 +4,15 @@ import time
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from slipcore.contact.defaults import FIDELITY, PROBE
-from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.elasticity.influence import Scaled
-from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
-from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.resolution import summary
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.free_grid import FreeSensorGrid, free_grid
-from slipcore.contact.tiers.load_steps import load_steps
+from slipcore.contact.tiers.load_steps import LoadSteps
+from slipcore.contact.tiers.probe import ContactProbe, probe
 from slipcore.contact.tiers.sampling import (
     FrameRecord,
     SensorGrid,
@@ -35,8 +30,8 @@ from slipcore.frames import FloatArray, GraspLog
 class Fidelity:
     """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver.
 
-    Where pressing moves the surface sideways there are more load steps: in none the contact becomes wider by more than
-    such a cell, or than a ``substeps``-th of it.
+    There are more load steps where an edge would move too far in one: where pressing moves the surface sideways the
+    contact becomes wider by a cell at most, or by a ``substeps``-th of it, and the edge of stick moves no farther.
 
     ``aligned``: cells are so small a part of a sensor element, an odd one, that points are cell centres, and there may
     be more of them than ``cells``; the truth at a point is then exact, and the stick ratio counts cells. Otherwise
@@ -62,11 +57,15 @@ def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = no_pr
     """
     fidelity = Fidelity() if fidelity is None else fidelity
     began = time.perf_counter()
-    where = grid_of(plan, fidelity)
+    contact = probe(plan)
+    where = grid_of(plan, fidelity, contact)
     gap_tolerance = FIDELITY.normal_share * fidelity.tolerance
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, gap_tolerance, second_order=True)
     times = frame_times(plan)
-    frames, warnings = _frames(plan, solver, where, times, fidelity, progress)
+    steps = LoadSteps(plan, contact)
+    growth = step_growth(fidelity)
+    instants = [steps.between(float(begin), float(end), fidelity.substeps, growth) for begin, end in pairwise(times)]
+    frames, warnings = _frames(plan, solver, where, instants, progress)
     metadata = {
         "tier": "boundary elements",
         "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
@@ -79,9 +78,9 @@ def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = no_pr
     return grasp_log(plan, where, times, frames, metadata)
 
 
-def grid_of(plan: Plan, fidelity: Fidelity) -> SensorGrid | FreeSensorGrid:
+def grid_of(plan: Plan, fidelity: Fidelity, contact: ContactProbe) -> SensorGrid | FreeSensorGrid:
     """The grid of a run, with the sensor's points on it."""
-    reach = PROBE.room * contact_reach(plan)
+    reach = PROBE.room * contact.reach
     if fidelity.aligned or plan.sampling is None:
         return sensor_grid(plan.sampling, reach, fidelity.cells)
     return free_grid(plan.sampling, reach, fidelity.cells)
@@ -91,13 +90,10 @@ def _frames(
     plan: Plan,
     solver: QuasiStatic,
     where: SensorGrid | FreeSensorGrid,
-    times: FloatArray,
-    fidelity: Fidelity,
+    steps: list[FloatArray],
     progress: Progress,
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
-    growth = step_growth(fidelity)
-    steps = [load_steps(plan, begin, end, fidelity.substeps, growth) for begin, end in pairwise(times)]
     state, count = solver.start(), sum(len(instants) - 1 for instants in steps)
     frames, warnings = [untouched(where)], list[tuple[str, ...]]()
     for instants in steps:
@@ -112,36 +108,7 @@ def _frames(
 
 
 def step_growth(fidelity: Fidelity) -> float:
-    """By how much a contact that moves sideways becomes wider in a step at most, as a share of its largest width."""
-    return 1.0 / (fidelity.cells * fidelity.substeps)
-
-
-def contact_reach(plan: Plan) -> float:
-    """How far from the centre the contact reaches along x or y under the largest normal force, m; found on a coarse
-    grid.
+    """By how much the contact becomes wider, or the edge of stick moves, in a step at most, as a share of the largest
+    width.
     """
-    problem = plan.problem
-    force = plan.largest_force()
-    softening = 1.0 + sum(branch.strength for branch in problem.creep)
-    operators = Operators((*(Scaled(body, softening) for body in problem.finger), *problem.obstacle))
-    reach = PROBE.first_reach
-    if force <= 0.0:
-        return reach
-    for _ in range(PROBE.tries):
-        grid = Grid.square(PROBE.cells, 2.0 * reach)
-        try:
-            height = problem.height(grid)
-            pressure = solve_normal(operators, grid, height, force=force, tolerance=PROBE.tolerance).pressure
-        except InvalidInput:  # no surface within reach yet
-            reach *= 2.0
-            continue
-        x, y = grid.points()
-        touching = pressure > 0.0
-        extent = float(np.maximum(np.abs(x), np.abs(y))[touching].max()) + 0.5 * grid.pitch[0]
-        if extent > PROBE.fills * reach:
-            reach *= 2.0
-        elif extent < PROBE.least * reach:
-            reach = PROBE.shrink * extent
-        else:
-            return extent
-    raise InvalidInput("contact", f"reaches beyond {reach:.3g} m", "surfaces that part within some metres")
+    return 1.0 / (fidelity.cells * fidelity.substeps)

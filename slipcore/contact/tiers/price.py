@@ -4,11 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slipcore.contact.defaults import ACCURACY
+from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.tiers.boundary_elements import Fidelity, step_growth
 from slipcore.contact.tiers.free_grid import sides
-from slipcore.contact.tiers.load_steps import growths
+from slipcore.contact.tiers.load_steps import LoadSteps
+from slipcore.contact.tiers.probe import ContactProbe
 from slipcore.contact.tiers.sampling import frame_times
 
 
@@ -30,17 +31,19 @@ def _load(cells: float) -> float:
 
 
 class Sizes:
-    """Of runs of a plan with a sensor, whose contact reaches ``reach`` m."""
+    """Of runs of a plan with a sensor, whose contact is known."""
 
-    def __init__(self, plan: Plan, reach: float) -> None:
+    def __init__(self, plan: Plan, contact: ContactProbe) -> None:
         assert plan.sampling is not None
-        self._sampling, self._reach = plan.sampling, reach
-        self._growths = growths(plan, frame_times(plan))
+        self._sampling, self._reach = plan.sampling, PROBE.room * contact.reach
+        self._growths = LoadSteps(plan, contact).growths(frame_times(plan))
 
     def of(self, fidelity: Fidelity) -> Size:
-        """Of a run at a fidelity: ``load_steps`` are as many but for rounding."""
+        """Of a run at a fidelity: ``LoadSteps`` are as many but for rounding."""
         nx, ny = sides(self._sampling, self._reach, fidelity.cells)
-        steps = np.maximum(np.ceil(self._growths / step_growth(fidelity)), fidelity.substeps)
+        parts, moves = fidelity.substeps, self._growths / step_growth(fidelity)
+        # Each part of a frame is cut by itself: half a step more than its share, on average.
+        steps = np.where(moves > parts, np.ceil(moves + 0.5 * (parts - 1)), parts)
         return Size(int(steps.sum()), nx * ny)
 
 

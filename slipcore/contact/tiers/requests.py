@@ -10,6 +10,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.contact.tiers.price import Pace, Size, Sizes
+from slipcore.contact.tiers.probe import ContactProbe
 from slipcore.frames import GraspLog
 
 
@@ -22,12 +23,12 @@ class OutOfTime(Exception):
 
 
 class Runs:
-    """Runs of plans whose contact reaches ``reach`` m, within ``budget`` s (inf for any time); ``strict``: a run that
-    proves to take far more than what is left of it is ended.
+    """Runs of plans with this contact, within ``budget`` s (inf for any time); ``strict``: a run that proves to take
+    far more than what is left of it is ended.
     """
 
-    def __init__(self, reach: float, budget: float, progress: Progress, *, strict: bool = True) -> None:
-        self._reach, self.budget, self._strict = reach, budget, strict
+    def __init__(self, contact: ContactProbe, budget: float, progress: Progress, *, strict: bool = True) -> None:
+        self._contact, self.budget, self._strict = contact, budget, strict
         self._began, self._progress, self._reported = time.perf_counter(), progress, 0.0
         self._pace, self._done, self._ahead = Pace(), 0.0, 0.0
         self._sizes: dict[float, Sizes] = {}
@@ -72,7 +73,7 @@ class Runs:
         assert plan.sampling is not None
         rate = plan.sampling.frame_rate
         if rate not in self._sizes:
-            self._sizes[rate] = Sizes(plan, self._reach)
+            self._sizes[rate] = Sizes(plan, self._contact)
         return self._sizes[rate].of(fidelity)
 
     def _tell(self, now: float, whole: float) -> None:

@@ -1,12 +1,13 @@
 """Loops in even steps of the force, and in equal steps of the stick zone's radius."""
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from benchmarks.contact.accuracy import hertz_grid, relative
-from benchmarks.contact.loops import WIDTH, by_front, ends, even, table
+from benchmarks.contact.loops import WIDTH, by_front, ends, even, scene_rows, scene_table, scenes, table
 
 
 def test_parts_of_a_pull_are_of_equal_radius() -> None:
@@ -32,3 +33,16 @@ def test_orders_are_those_from_one_row_to_the_next() -> None:
     lines = table([(0.9, "of equal force", 6, 4e-3, 2e-2), (0.9, "of equal force", 12, 1e-3, 1e-2)]).splitlines()
     assert lines[2] == "| 0.9 μF_N | of equal force | 6 | 4.0e-03 |  | 2.0e-02 |  |"
     assert lines[3] == "| 0.9 μF_N | of equal force | 12 | 1.0e-03 | 2.00 | 1.0e-02 | 1.00 |"
+
+
+def test_scenes_are_measured_in_the_steps_of_the_library() -> None:
+    loop = next(case for case in scenes() if case.name.startswith("loop"))
+    rows = list(scene_rows(loop, 16))
+    assert [row[0] for row in rows] == [loop.name] * 3
+    assert all(after[1] > before[1] and after[2] < before[2] for before, after in pairwise(rows))
+    lines = scene_table([("press", 10, 4e-3, 2e-2), ("press", 20, 1e-3, 1e-2), ("loop", 40, 1e-4, 1e-3)]).splitlines()
+    assert lines[2:] == [
+        "| press | 10 | 4.0e-03 |  | 2.0e-02 |  |",
+        "| press | 20 | 1.0e-03 | 2.00 | 1.0e-02 | 1.00 |",
+        "| loop | 40 | 1.0e-04 |  | 1.0e-03 |  |",
+    ]

@@ -30,6 +30,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.tiers import requests as runs
 from slipcore.contact.tiers.accuracy import Difference, Refined
 from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.probe import ContactProbe
 from slipcore.frames import GraspLog
 
 ANSWERED = RandomRequest(0, ("FiniteLayer",), "answered", 0.1, 0.04, 0.02, 1.0)
@@ -124,7 +125,7 @@ def test_budgets_run_by_processor_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a log in which the other programs of a machine take up all of its time."""
 
     def takes_long(*_: object, **__: object) -> Refined:
-        clock = runs.Runs(1e-3, 1.0, lambda _: None)
+        clock = runs.Runs(ContactProbe(1e-3), 1.0, lambda _: None)
         time.sleep(0.3)
         return Refined(cast("GraspLog", None), Fidelity(20), Difference(0.1, 0.1, 0.1), clock.spent)
 

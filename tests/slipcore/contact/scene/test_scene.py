@@ -8,7 +8,8 @@ import pytest
 from slipcore.contact.effects import FlatSurface, SensorSampling, TangentialLoad
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.scene import Finger, Press, Scene, simulate
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.probe import contact_reach
 from slipcore.contact.tiers.sampling import SensorGrid, sensor_grid
 from slipcore.errors import InvalidInput
 from slipcore.frames import FrictionLaw

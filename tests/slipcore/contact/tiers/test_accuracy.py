@@ -19,6 +19,7 @@ from slipcore.contact.tiers import accuracy, requests
 from slipcore.contact.tiers.accuracy import Difference, _AccuracySearch, difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.contact.tiers.price import Pace, Size, Sizes
+from slipcore.contact.tiers.probe import ContactProbe, probe
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -81,7 +82,7 @@ class Clock:
         return self.now
 
     def run(self, plan: Plan, fidelity: Fidelity, progress: Progress = no_progress) -> GraspLog:
-        size, began = Sizes(plan, 4e-3).of(fidelity), self.now
+        size, began = Sizes(plan, probe(plan)).of(fidelity), self.now
         self.runs.append(fidelity)
         for part in np.linspace(0.1, 1.0, 10):
             self.now = began + float(part) * size.steps * (self.step + self.cell * size.cells)
@@ -322,7 +323,7 @@ def test_a_run_tells_which_part_of_it_is_done(monkeypatch: pytest.MonkeyPatch) -
             heard(part)
 
     monkeypatch.setattr(requests, "run", ran)
-    runs = requests.Runs(5e-3, np.inf, told.append)
+    runs = requests.Runs(ContactProbe(5e-3), np.inf, told.append)
     works = [requests._work(runs._size(plan, fidelity)) for fidelity in (coarse, fine)]
     runs.expect(plan, (coarse, fine))
     runs.run(plan, coarse)

@@ -9,6 +9,7 @@ from slipcore.contact.scene import Scene
 from slipcore.contact.tiers.accuracy import difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, grid_of, run
 from slipcore.contact.tiers.free_grid import FreeSensorGrid, free_grid
+from slipcore.contact.tiers.probe import probe
 
 SENSOR = SamplingPlan((7, 4), 1e-3, 10.0)
 
@@ -48,7 +49,7 @@ def test_elements_share_cells_by_area_and_lose_no_force() -> None:
 
 def test_a_run_on_a_free_grid_comes_near_a_fine_aligned_one() -> None:
     plan = Scene("shear", (TangentialLoad((3.2, 0.0)), SensorSampling((12, 12), 1e-3, 6.0))).plan()
-    assert isinstance(grid_of(plan, Fidelity(30, aligned=False)), FreeSensorGrid)
+    assert isinstance(grid_of(plan, Fidelity(30, aligned=False), probe(plan)), FreeSensorGrid)
     fine = run(plan, Fidelity(70))
     free = [difference(run(plan, Fidelity(cells, aligned=False)), fine) for cells in (16, 40)]
     for measure in ("stick_ratio", "displacement", "force"):

@@ -1,15 +1,22 @@
 """What runs cost by their steps and cells, and what is told of the pace from those that were made."""
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from slipcore.contact.defaults import ACCURACY
+from slipcore.contact.effects import LoadPath, NormalTangentialCoupling, SensorSampling
+from slipcore.contact.scene import Press, Scene
 from slipcore.contact.tiers import choice, requests
-from slipcore.contact.tiers.price import Pace, Size
+from slipcore.contact.tiers.boundary_elements import Fidelity, step_growth
+from slipcore.contact.tiers.load_steps import LoadSteps
+from slipcore.contact.tiers.price import Pace, Size, Sizes
+from slipcore.contact.tiers.probe import ContactProbe, probe
 from slipcore.contact.tiers.requests import OutOfTime, Runs
+from slipcore.contact.tiers.sampling import frame_times
 from slipcore.errors import InvalidInput
 
 ORDER, USUAL, SPREAD = ACCURACY.cost_order, ACCURACY.overhead_cells, ACCURACY.overhead_spread
@@ -29,6 +36,18 @@ def test_before_the_first_run_nothing_is_known_and_after_it_the_usual() -> None:
     larger = Size(10, 4000)
     expected = 3.0 * larger.work(USUAL) / Size(10, 1000).work(USUAL)
     assert pace.seconds(larger) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 8])
+def test_sizes_count_the_load_steps_of_a_run(substeps: int) -> None:
+    """Of a press that shears, and of two pulls close to sliding; but for rounding, and without in one step a frame."""
+    path = LoadPath((0.5, 1.1, 1.7), force_x=(0.0, 3.4, -3.4))
+    effects = (path, NormalTangentialCoupling(), SensorSampling((12, 12), 1e-3, 10.0))
+    plan = Scene("loop", effects, press=Press(10.0, 0.5), duration=1.7).plan()
+    contact, fidelity = probe(plan), Fidelity(48, substeps)
+    steps, frames = LoadSteps(plan, contact), pairwise(map(float, frame_times(plan)))
+    made = sum(len(steps.between(*ends, substeps, step_growth(fidelity))) - 1 for ends in frames)
+    assert Sizes(plan, contact).of(fidelity).steps == pytest.approx(made, rel=0.0 if substeps == 1 else 0.03)
 
 
 def told(small: tuple[int, float], large: tuple[int, float]) -> float:
@@ -98,7 +117,7 @@ def made(monkeypatch: pytest.MonkeyPatch, budget: float, parts: list[tuple[float
 
     monkeypatch.setattr(requests, "run", run)
     monkeypatch.setattr(requests, "Sizes", lambda *_: SimpleNamespace(of=lambda size: size))
-    return Runs(5e-3, budget, reported.append, **options), reported, clock
+    return Runs(ContactProbe(5e-3), budget, reported.append, **options), reported, clock
 
 
 PLAN: Any = SimpleNamespace(sampling=SimpleNamespace(frame_rate=30.0))

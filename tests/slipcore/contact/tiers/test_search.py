@@ -79,11 +79,14 @@ def test_cells_grow_by_a_guess_then_by_the_error_over_what_is_allowed(
 
 
 def test_the_last_run_ahead_is_the_one_whose_error_should_do() -> None:
-    """0.7 of the target is the grid's: an error of 0.14 on 40 cells asks for four times as many for 0.05."""
+    """0.7 of the target is the grid's: an error of 0.14 on 40 cells asks for a quarter of it for 0.05."""
     following = search(0.05).at(60, 1)
-    assert [each.cells for each in search(0.05).ahead(following, 40, error(0.14))] == [60, 160]
-    assert [each.cells for each in search(0.05).ahead(following, 12, None)] == [60]  # 0.15 on 12: 52
-    assert [each.cells for each in search(0.02).ahead(following, 12, None)] == [60, _even(12.0 * 0.15 / 0.014)]
+    enough = [
+        _even(cells * growth ** (1.0 / ACCURACY.usual_ratio_order)) for cells, growth in ((40, 4.0), (12, 0.15 / 0.014))
+    ]
+    assert [each.cells for each in search(0.05).ahead(following, 40, error(0.14))] == [60, enough[0]]
+    assert [each.cells for each in search(0.05).ahead(following, 12, None)] == [60]  # 0.15 on 12: 34
+    assert [each.cells for each in search(0.02).ahead(following, 12, None)] == [60, enough[1]]
     assert search(0.0).ahead(following, 12, None) == (following,)
 
 
