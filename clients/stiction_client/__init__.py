@@ -20,6 +20,7 @@ from stiction_client.errors import (
     ProblemError,
     StaleModel,
     StictionError,
+    StreamEnded,
     UnexpectedAnswer,
 )
 
@@ -177,6 +178,7 @@ __all__ = [
     "SlipSamples",
     "StaleModel",
     "StictionError",
+    "StreamEnded",
     "UnexpectedAnswer",
     "Withdrawal",
     "antipodal",

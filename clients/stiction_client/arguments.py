@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Mapping
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Any
 
 import numpy as np
 
 from stiction_client.elementwise import Number
 from stiction_client.errors import InvalidArgument
+
+ONE = (float, int, NoneType)
+"""Types of what is no array."""
 
 
 def within(name: str, value: object, low: float, high: float, unit: str = "") -> Number:
@@ -46,7 +49,7 @@ def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
 
 def of_one_shape(**given: object) -> None:
     """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
-    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, float | int | None)}  # type: ignore[call-overload]
+    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, ONE)}  # type: ignore[call-overload]
     if not shapes:
         return
     try:

@@ -27,6 +27,19 @@ class AnswerTimedOut(ConnectionFailed, TimeoutError):
     """A live stream's answer has not come in time."""
 
 
+class StreamEnded(ConnectionFailed):
+    """The service ended a live stream: its ``code`` and ``reason`` (docs/stream.md), 4422 where it was asked for what
+    cannot be.
+    """
+
+    def __init__(self, code: int, reason: str) -> None:
+        super().__init__(code, reason)
+        self.code, self.reason = code, reason
+
+    def __str__(self) -> str:
+        return f"the service ended the stream: {self.reason} ({self.code})"
+
+
 class ProblemError(StictionError):
     """The service refused a request (RFC 9457 problem).
 

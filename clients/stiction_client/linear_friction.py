@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
 from stiction_client.arguments import shown
-from stiction_client.elementwise import FloatArray, Number
+from stiction_client.elementwise import FloatArray, Number, special
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import UNKNOWN_SENSOR, Domain, Kind, Support, extrapolation, notes, support, widening
 
@@ -43,9 +43,7 @@ class Scale:
 
     def quantile(self, level: Number) -> Number:
         """Quantile of one draw, in the shape of ``level``."""
-        from scipy import special  # takes longer to import than all else of this package
-
-        return cast(Number, self.value * special.stdtrit(self.degrees_of_freedom, level))
+        return cast(Number, self.value * special().stdtrit(self.degrees_of_freedom, level))
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,22 +183,18 @@ class LinearFriction:
 
     def interval(self, level: float = 0.95) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]."""
-        from scipy import special
-
         self._check_probability("level", level)
-        half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
+        half = special().stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
 
     def scale_interval(self, level: float = 0.95) -> tuple[float, float]:
         """Central interval of σ at ``level``, by the χ² distribution of its estimate."""
-        from scipy import special
-
         self._check_probability("level", level)
         freedom = self.scatter_degrees_of_freedom
         if math.isinf(freedom):
             return self.scale, self.scale
         tails = 0.5 * (1.0 - level), 0.5 * (1.0 + level)
-        low, high = (self.scale * math.sqrt(freedom / special.chdtri(freedom, tail)) for tail in tails)
+        low, high = (self.scale * math.sqrt(freedom / special().chdtri(freedom, tail)) for tail in tails)
         return low, high
 
     def predict(
@@ -224,8 +218,6 @@ class LinearFriction:
         quantile is below 0. Shapes broadcast. Raises ``refusal`` for a quantile outside (0, 1) and for a contact of no
         elements.
         """
-        from scipy import special
-
         count = self._averaged_elements(of, elements)
         v, f_n = np.broadcast_arrays(*self._point(tangential_velocity, normal_force))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
@@ -236,8 +228,8 @@ class LinearFriction:
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
         shared, own = self.scatter(quantile, count)
         scatter = np.hypot(shared * mean, own)
-        uncertain = special.stdtrit(self.degrees_of_freedom, quantile) * error
-        distance = np.hypot(np.hypot(scatter, uncertain), special.ndtri(quantile) * widening(self, v, f_n))
+        uncertain = special().stdtrit(self.degrees_of_freedom, quantile) * error
+        distance = np.hypot(np.hypot(scatter, uncertain), special().ndtri(quantile) * widening(self, v, f_n))
         return np.asarray(np.maximum(mean + np.sign(quantile - 0.5) * distance, 0.0))
 
     def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
@@ -245,10 +237,8 @@ class LinearFriction:
 
         The two add as root of squares. Shapes broadcast.
         """
-        from scipy import special
-
         if self.scales is None:
-            return 0.0, cast(Number, special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
+            return 0.0, cast(Number, special().stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
         place, within = self.scales.between_places.quantile(quantile), self.scales.within.quantile(quantile)
         own = ((place * place + within * within) / elements) ** 0.5
         shared, sensors = self.scales.between_grasps.quantile(quantile), self.scales.between_sensors

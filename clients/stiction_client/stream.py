@@ -17,7 +17,7 @@ from stiction_client import json_values
 from stiction_client.address import service_address
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
-from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
+from stiction_client.errors import AnswerTimedOut, ConnectionFailed, StreamEnded, UnexpectedAnswer
 from stiction_client.records import Finding
 
 RESUMABLE = (1001, 1006, 1012, 4503)
@@ -291,6 +291,4 @@ def _control(settings: ControlSettings) -> dict[str, Any]:
 
 def _refused(error: ConnectionClosed) -> ConnectionFailed:
     received = error.rcvd
-    return ConnectionFailed(
-        f"the service ended the stream: {received.reason} ({received.code})" if received else str(error)
-    )
+    return StreamEnded(received.code, received.reason) if received else ConnectionFailed(str(error))

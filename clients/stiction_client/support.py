@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.defaults import BEND, UNCERTAIN
-from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, plain, root, select
+from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, plain, root, select, special
 
 Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
 
@@ -247,12 +247,10 @@ def extrapolation(domain: Domain, tangential_velocity: float, normal_force: floa
 
 def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
     """The friction expected at v and f_n, and the half-width of its 95 % interval."""
-    from scipy import special  # takes longer to import than all else of this package
-
     b0, b1, b2 = model.coefficients.tolist()
     (c00, c01, c02), (c10, c11, c12), (c20, c21, c22) = model.covariance.tolist()
     variance = c00 + v * (c01 + c10) + v * v * c11 + f_n * (c02 + c20 + v * (c12 + c21) + f_n * c22)
-    return b0 + v * b1 + f_n * b2, plain(special.stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
+    return b0 + v * b1 + f_n * b2, plain(special().stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
 
 
 def _knows_no_velocity(model: Model) -> bool:

@@ -1,5 +1,6 @@
 """What a live stream does where its connection breaks, without a network: what is answered stands beforehand."""
 
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.frames import Close
 
-from stiction_client import AnswerTimedOut, ConnectionFailed, InvalidArgument, UnexpectedAnswer, stream
+from stiction_client import AnswerTimedOut, ConnectionFailed, InvalidArgument, StreamEnded, UnexpectedAnswer, stream
 from stiction_client.stream import SlipStream
 
 OPENED = {"type": "opened", "session": "s"}
@@ -148,9 +149,11 @@ def test_what_a_service_refuses_is_told_with_its_reason_and_not_asked_again(open
     refused: ConnectionClosed = ConnectionClosedError(Close(4401, "the key has ended"), None)
     live, made = opened([refused])
     send(live, 1)
-    with pytest.raises(ConnectionFailed, match=r"the key has ended \(4401\)"):
+    with pytest.raises(StreamEnded, match=r"the key has ended \(4401\)") as ended:
         live.receive()
-    assert len(made) == 1
+    assert isinstance(ended.value, ConnectionFailed)
+    assert (ended.value.code, ended.value.reason, len(made)) == (4401, "the key has ended", 1)
+    assert str(pickle.loads(pickle.dumps(ended.value))) == str(ended.value)
 
 
 def test_an_answer_that_is_late_may_be_waited_for_again(opened: Any) -> None:
