@@ -843,6 +843,8 @@ class CheckOptions(Options):
     """Largest share of frames that are copies of the one before."""
     largest_pressure: Annotated[float, Option(0.0, 1e12, "Pa", "gels tear and fingertips hurt below 1 MPa")] = 5e6
     """Largest normal force over element area."""
+    largest_modulus: Annotated[float, Option(0.0, 1e15, "Pa", "silicone, rubber and thin gels are below 5e6")] = 5e7
+    """Largest modulus of a skin, of the largest force, the area that bears it, and the largest displacement."""
     saturated_share: Annotated[float, Option(0.0, 1.0, "-", "one element has the largest, four by symmetry")] = 0.05
     """Largest share of the elements in contact that reach the largest reading, to the last digit."""
     rest_share: Annotated[float, Option(0.0, 1.0, "-", "linear gels bear no larger share of the force then")] = 0.03

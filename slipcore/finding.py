@@ -19,6 +19,7 @@ SEVERITIES: dict[str, Severity] = {
     "element area": "warning",
     "repeated frames": "note",
     "force too large": "warning",
+    "displacement too small": "note",
     "force pulls": "warning",
     "forces not believed": "note",
     "late forces": "warning",

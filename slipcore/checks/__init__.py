@@ -28,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     recording.element_area,
     recording.repeated_frames,
     recording.force_unit,
+    recording.displacement_unit,
     recording.force_sign,
     recording.saturation,
     recording.rest_in_contact,

@@ -74,6 +74,29 @@ def force_unit(seen: Subject) -> Iterator[Finding]:
         yield Finding("force too large", evidence, "make sure of N (not mN, g or raw counts) and of the element's area")
 
 
+def displacement_unit(seen: Subject) -> Iterator[Finding]:
+    """Displacements too small for what presses, as of metres that were taken for millimetres.
+
+    The skin's modulus is that of a half-space under a flat punch, F = 2 a E u (Johnson, 1985, Contact Mechanics,
+    eq. 3.36, E for E / (1 - ν²)), of a contact with as much area as its elements have that bear the force.
+    """
+    if seen.forces is None or seen.log.has_reconstructed_force or not seen.log.displacement.any():
+        return
+    pressing = seen.pressing[np.argmax(seen.pressing.sum(axis=(1, 2)))]
+    force, square = float(pressing.sum()), float(np.sum(pressing**2))
+    if not force > 0.0 or float(pressing.max()) > seen.limits.largest_pressure * seen.log.element_area:
+        return
+    radius = np.sqrt(force**2 / square * seen.log.element_area / np.pi)
+    moved = float(np.linalg.norm(seen.log.displacement, axis=-1).max())
+    modulus = force / (2.0 * radius * moved)
+    if modulus > seen.limits.largest_modulus:
+        evidence = (
+            f"under {force:.3g} N no marker moves by more than {1e6 * moved:.3g} µm, as on a skin of {modulus:.2g} Pa"
+        )
+        remedy = "make sure that displacement is in m (a mapping's `unit`), and force in N"
+        yield Finding("displacement too small", evidence, remedy)
+
+
 def force_sign(seen: Subject) -> Iterator[Finding]:
     """Forces with the wrong sign."""
     if seen.forces is None:

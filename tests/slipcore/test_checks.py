@@ -159,6 +159,7 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
     "repeated frames": doubled,
     "force too large": lambda log: with_force(log, 1e2 * np.asarray(log.force)),
+    "displacement too small": lambda log: replace(log, displacement=1e-3 * log.displacement),
     "force pulls": lambda log: with_force(log, -np.asarray(log.force)),
     "saturation": saturated,
     "no rest": lambda log: log.take(slice(30, None)),
