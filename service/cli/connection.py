@@ -10,11 +10,26 @@ if TYPE_CHECKING:
 
 
 @contextmanager
+def reached(url: str) -> Iterator[None]:
+    """Say of a service that can't be reached how to start one; not of one that is late, or refuses a stream."""
+    from stiction_client.errors import AnswerTimedOut, ConnectionFailed
+
+    try:
+        yield
+    except ConnectionFailed as failure:
+        from websockets.exceptions import ConnectionClosed
+
+        if not isinstance(failure, AnswerTimedOut) and not isinstance(failure.__cause__, ConnectionClosed):
+            failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
+        raise
+
+
+@contextmanager
 def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
     """A client of the service, whose errors say what to do where the service can't: a likely name, how to start one."""
-    from stiction_client import ConnectionFailed, FrictionClient, problems
+    from stiction_client import FrictionClient, problems
 
-    with FrictionClient(url, key=key) as client:
+    with reached(url), FrictionClient(url, key=key) as client:
         try:
             yield client
         except problems.UnknownMaterial as problem:
@@ -24,7 +39,4 @@ def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
             problem.add_note(
                 "`stiction upload --create` makes a new one; `stiction materials list` shows those there are"
             )
-            raise
-        except ConnectionFailed as failure:
-            failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
             raise

@@ -16,6 +16,18 @@ CODE_OF_STATUS = {
 """How an upload ended, as an exit code: our fault, data that allow no fit, not wanted, a file that is not taken."""
 
 
+OPTIONS = {
+    "fn": "--normal-force",
+    "v": "--velocity",
+    "tangential_velocity": "--velocity",
+    "tangential_load": "--load",
+    "area": "--contact-area",
+    "at_force": "--round-at",
+    "normal_force_limit": "--limit",
+}
+"""What commands call a value that services and the planner know by another name."""
+
+
 def message(error: Exception) -> str:
     """What is said of an error before the command ends."""
     from pydantic import ValidationError
@@ -25,8 +37,15 @@ def message(error: Exception) -> str:
     if isinstance(error, ValidationError):
         text = complaints(error)
     else:
-        text = _of_system(error) if isinstance(error, OSError) else str(error)
+        text = _by_option(error, _of_system(error) if isinstance(error, OSError) else str(error))
     return "\n".join([text, *getattr(error, "__notes__", ())])
+
+
+def _by_option(error: Exception, text: str) -> str:
+    """What is said of a wrong value, called as the command does."""
+    name = getattr(error, "name", None)
+    rest = text.removeprefix(f"{name} is ")
+    return text if rest == text or name not in OPTIONS else f"{OPTIONS[name]} is {rest}"
 
 
 def _of_system(error: OSError) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli.connection import reached
 from service.cli.inputs import read_log
 from service.cli.options import DEFAULT_URL, DETECTOR_HELP, FrameRate, Json, Key, Mapping, Rest, Scale, Url
 from service.cli.output import print_json, print_lines
@@ -52,7 +53,7 @@ def stream(
         raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
     detector = method or recommended_method(grasp)
     options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store, "detector": detector}
-    with SlipStream(url, grasp.position, grasp.element_area, key=key, **options) as live:
+    with reached(url), SlipStream(url, grasp.position, grasp.element_area, key=key, **options) as live:
         page = f"{url.rstrip('/')}/live/{live.session}"
         typer.echo(f"to be watched at {page}", err=True)
         try:

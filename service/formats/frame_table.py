@@ -4,6 +4,7 @@ and element (docs/formats.md).
 
 import re
 from array import array
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -131,8 +132,13 @@ class _Table:
         return notes
 
     def contents(self) -> str:
-        """The columns."""
-        return f"the columns {', '.join(self._names)}"[:300]
+        """The columns, those of numbered elements as a field names them."""
+        numbered = [re.sub(r"\d{1,6}", ANY_NUMBER, name, count=1, flags=re.ASCII) for name in self._names]
+        times = Counter(numbered)
+        told = dict.fromkeys(
+            field if times[field] > 1 else name for name, field in zip(self._names, numbered, strict=True)
+        )
+        return f"the columns {', '.join(told)}"[:300]
 
     def _columns(self, field: str) -> list[int]:
         if ANY_NUMBER not in field:

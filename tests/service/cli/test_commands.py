@@ -395,11 +395,21 @@ def test_an_unknown_detector_is_refused_with_those_that_exist(run: Run, ramps: l
     assert "strain_rate" in err
 
 
-def test_a_service_that_is_not_there_has_its_own_exit_code(run: Run) -> None:
+def test_a_service_that_is_not_there_has_its_own_exit_code(run: Run, ramps: list[Path]) -> None:
     code, _, err = run("lookup", "paper", "--url", "http://127.0.0.1:9")
     assert code == SERVICE_REFUSED
     assert "ConnectError" in err
     assert "is a service running at http://127.0.0.1:9?" in err
+    code, _, err = run("stream", ramps[0], "--url", "http://127.0.0.1:9")
+    assert code == SERVICE_REFUSED
+    assert "is a service running at http://127.0.0.1:9?" in err
+
+
+def test_a_service_that_refuses_a_stream_is_not_looked_for(run: Run, url: str, ramps: list[Path]) -> None:
+    code, _, err = run("stream", ramps[0], "--material", "unobtainium", "--url", url)
+    assert code == SERVICE_REFUSED
+    assert "unobtainium" in err
+    assert "is a service running" not in err
 
 
 def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[Path], url: str) -> None:

@@ -77,6 +77,23 @@ def test_what_is_said_of_an_error_is_its_text_and_its_notes_line_by_line() -> No
 
 
 @pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (InvalidArgument("tangential_load", -1.0, "0 or more"), "--load is -1.0; allowed: 0 or more"),
+        (InvalidArgument("at_force", 0.0, "above 0"), "--round-at is 0.0; allowed: above 0"),
+        (InvalidArgument("of", "x", "element or contact"), "of is x; allowed: element or contact"),
+        (
+            ProblemError("/problems/invalid-request", 422, "fn is -1; allowed: 0 to 10", "fn", "-1", "0 to 10"),
+            "--normal-force is -1; allowed: 0 to 10 (422, /problems/invalid-request)",
+        ),
+        (ProblemError("/problems/no-model", 409, "nothing at v", "v", "1"), "nothing at v (409, /problems/no-model)"),
+    ],
+)
+def test_a_wrong_value_is_called_as_the_option_is(error: Exception, told: str) -> None:
+    assert message(error) == told
+
+
+@pytest.mark.parametrize(
     ("arguments", "garbled"),
     [
         (["a", "é\U0001f600"], None),

@@ -339,7 +339,7 @@ def test_what_frames_state_alike_of_a_log_is_taken_once() -> None:
 
 def test_a_component_without_columns_is_named(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
-    with pytest.raises(InvalidInput, match=r"force is not there \(P\*_FN\); allowed: the columns T_us, P0_DX"):
+    with pytest.raises(InvalidInput, match=r"force is not there \(P\*_FN\); allowed: the columns T_us, P\*_DX, P\*_DY"):
         read(path, force=["P*_FX", "P*_FY", "P*_FN"])
 
 
