@@ -38,6 +38,11 @@ EMPTY_IS_NONE = BeforeValidator(lambda text: None if text == "" else text)
 """Of a field that may be left empty."""
 
 
+def typed(value: float | None) -> str:
+    """A number as it stands in a form again; empty for None."""
+    return "" if value is None else f"{value:.12g}"
+
+
 class FormRoute(FairRoute):
     """A route whose form is of bounded size: all of it is parsed before it is asked who sends it."""
 

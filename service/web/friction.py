@@ -10,6 +10,7 @@ from db.records import Material, StoredModel
 from service.domain.models.recommended import disagreeing, recommended
 from service.domain.models.stored_results import to_friction_model
 from service.domain.planning.record_next import RecordNext, record_next
+from service.formatting import number
 from service.report.wording import COEFFICIENTS, LEVELS, expected_friction
 from service.web.charts import Chart, Curve, draw
 from stiction_client.support import OUTDATED, Support
@@ -127,10 +128,12 @@ def sections(stored: StoredModel, at: FrictionEstimate) -> list[Chart]:
     v = np.linspace(0.0, max(BEYOND * velocities[1], at.tangential_velocity), POINTS)
     over_force = _Section(f_n, forces, at.normal_force, "normal force on an element, N")
     over_velocity = _Section(v, velocities, at.tangential_velocity, "tangential velocity, m/s")
-    charts = [_chart(stored, over_force, at.tangential_velocity, f_n, f"At velocity {at.tangential_velocity:g} m/s")]
+    charts = [
+        _chart(stored, over_force, at.tangential_velocity, f_n, f"At velocity {number(at.tangential_velocity)} m/s")
+    ]
     if v[-1] > 0.0:
         charts.append(
-            _chart(stored, over_velocity, v, at.normal_force, f"At a normal force of {at.normal_force:.3g} N")
+            _chart(stored, over_velocity, v, at.normal_force, f"At a normal force of {number(at.normal_force)} N")
         )
     return charts
 

@@ -13,6 +13,7 @@ from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute
 from service.http.problems import INVALID_REQUEST, Problem
 from service.web.comparison import MOST_COMPARED, common_force, compare, picture
+from service.web.forms import typed
 from service.web.friction import usual_model
 from service.web.materials import names
 from service.web.rendering import render
@@ -41,7 +42,7 @@ def compare_models(
         chart=None if force is None else picture(found, force),
         force=force,
         without=without,
-        asked={"materials": wanted, "models": model, "fn": fn},
+        asked={"materials": wanted, "models": model, "fn": typed(fn)},
         names=names(context),
         most=MOST_COMPARED,
     )

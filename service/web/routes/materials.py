@@ -27,7 +27,7 @@ from service.http.schemas.materials import MaterialOut, NewMaterial
 from service.report.wording import NEWEST_LOGS
 from service.web import reports
 from service.web.derived import derive
-from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
+from service.web.forms import EMPTY_IS_NONE, FormRoute, checked, typed
 from service.web.friction import coefficients, friction_at, listed, next_of, sections, usual_model
 from service.web.grasp_effects import MOST_GRASPS, differing, draw_effects
 from service.web.posterior import densities, pairs
@@ -61,7 +61,7 @@ def list_materials(
     if not found and not search and cursor is None:
         return render(request, "welcome.html")
     rows = [listed(each, fn) for each in found]
-    asked = {"search": search, "sort": sort, "fn": "" if fn is None else f"{fn:g}"}
+    asked = {"search": search, "sort": sort, "fn": typed(fn)}
     return render(request, "materials.html", rows=rows, asked=asked, after=after, is_first=cursor is None)
 
 
@@ -113,7 +113,7 @@ def show_material(
         effect_chart=draw_effects(effects) if effects else None,
         densities=[] if stored is None else densities(stored),
         pairs=[] if stored is None else pairs(stored),
-        asked={"fn": fn, "v": v, "method": method},
+        asked={"fn": typed(fn), "v": typed(v), "method": method},
         versions=versions,
         logs=logs,
         after=after,

@@ -21,7 +21,7 @@ from service.http.paging import Page
 from service.http.routes.sensors import SensorName
 from service.http.schemas.common import CursorText
 from service.http.schemas.sensors import GelIn
-from service.web.forms import FormRoute, checked, revised
+from service.web.forms import FormRoute, checked, revised, typed
 from service.web.rendering import on_problem, render
 from service.web.routes.materials import LOGS_ON_A_PAGE, ON_A_PAGE
 
@@ -101,5 +101,4 @@ def count_findings(logs: Sequence[StoredGraspLog]) -> list[tuple[str, int]]:
 
 def _typed(gel: Gel | None) -> dict[str, str]:
     """The form of what is known of a gel."""
-    known = {} if gel is None else {name: getattr(gel, name) for name in FIELDS}
-    return {name: f"{value:.12g}" for name, value in known.items() if value is not None}
+    return {} if gel is None else {name: typed(getattr(gel, name)) for name in FIELDS}

@@ -208,6 +208,14 @@ def test_the_calculator_asks_for_the_recommended_model_unless_told_otherwise(bro
 
 
 @ON_SQLITE
+def test_of_several_wrong_values_each_is_told_once(browser: Any, elements: Any) -> None:
+    asked = {"tangential_load": "-1", "contact_area": "6e-5", "round_at": "0", "material": "paper"}
+    told = elements(browser.get("/plan", params=asked).text).text
+    assert told.count("“Load of all fingers together, N” is -1; allowed: a number, 0 to 1e6") == 1
+    assert told.count("“Round fingertip: force under which it has that area, N” is 0") == 1
+
+
+@ON_SQLITE
 def test_the_calculator_shows_all_that_it_was_asked(browser: Any, elements: Any) -> None:
     asked = dict.fromkeys(NewGraspForce.model_fields, "1") | {"method": "ols", "of": "element", "sensor": "left"}
     found = elements(browser.get("/plan", params=asked | {"tangential_load": ""}).text).found

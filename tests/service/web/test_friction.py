@@ -31,7 +31,8 @@ def test_no_friction_below_0_is_shown_where_the_law_falls_so_far() -> None:
     assert (shown.mean, shown.interval) == (None, None)
     assert shown.support.kind == "implausible"
     assert [each.friction.mean for each in compare([stored, replace(stored, id=2)], 2.0)] == [None, None]
-    over_force, _ = sections(stored, shown)
+    over_force, over_velocity = sections(stored, shown)
+    assert (over_force.title, over_velocity.title) == ("At velocity 0 m/s", "At a normal force of 2.00 N")
     zero = next(tick.place for tick in over_force.y_ticks if tick.text == "0")
     heights = [float(point.split(",")[1]) for point in over_force.line.split()]
     assert heights[0] < zero == pytest.approx(max(heights), abs=0.1)  # downwards, as an SVG counts

@@ -40,6 +40,7 @@ def test_a_material_is_listed_with_friction_and_interval(browser: Any) -> None:
 def test_a_working_point_outside_the_data_is_marked(browser: Any) -> None:
     assert "outside the data" not in browser.get("/?fn=0.05").text
     assert "outside the data" in browser.get("/?fn=5").text
+    assert 'value="0.1234567"' in browser.get("/?fn=0.1234567").text
 
 
 @pytest.mark.usefixtures("store")
