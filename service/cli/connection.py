@@ -12,14 +12,12 @@ if TYPE_CHECKING:
 @contextmanager
 def reached(url: str) -> Iterator[None]:
     """Say of a service that can't be reached how to start one; not of one that is late, or refuses a stream."""
-    from stiction_client.errors import AnswerTimedOut, ConnectionFailed
+    from stiction_client.errors import AnswerTimedOut, ConnectionFailed, StreamEnded
 
     try:
         yield
     except ConnectionFailed as failure:
-        from websockets.exceptions import ConnectionClosed
-
-        if not isinstance(failure, AnswerTimedOut) and not isinstance(failure.__cause__, ConnectionClosed):
+        if not isinstance(failure, AnswerTimedOut | StreamEnded):
             failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
         raise
 
