@@ -23,6 +23,10 @@ LEAST_CERTAIN = 0.3
 """-, 0 to 0.5: largest probability at whose quantile a model's scatter is read; near a half it lies at the mean, and
 shows none."""
 
+MOST_SLIP = 0.1
+"""-, 0 to 0.5: largest slip probability that a refusal tells as one that could be held: who may lose one grasp in ten
+has no use for a planner, and near a half it is the mean that holds, however little is known."""
+
 MOST_STEPS = 200
 """-, 50 and more: steps of a search; a root that only touches takes 50, any other fewer than 20."""
 

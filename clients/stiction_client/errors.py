@@ -130,7 +130,7 @@ class NoFeasibleForce(StictionError):
     ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N; ``cause``: whether
     physics, the limit, the range of the data or ignorance is why; ``largest_observed``: greatest normal force of an
     element in the data, N, where it is known; ``least_slip_probability``: the least with which a force does hold, None
-    where none does by ½.
+    where none does by 0.1.
     """
 
     def __init__(

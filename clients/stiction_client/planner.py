@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from stiction_client.arguments import of_one_shape, shown, within
 from stiction_client.contacts import AREAS, Contact, Contacts
+from stiction_client.defaults import MOST_SLIP
 from stiction_client.elementwise import FloatArray, Number, anywhere, hypot, least, of_these, select
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact
@@ -337,19 +338,19 @@ def _one(
 
 
 def _least_slip_probability(asked: Callable[[Number], _Question], refused: float) -> float | None:
-    """The least above ``refused`` with which a force holds, rounded up to three digits; None where none does by ½."""
+    """The least above ``refused`` with which a force holds, to three digits rounded up; None: none by ``MOST_SLIP``."""
 
     def holds(probability: float) -> bool:
         question = asked(probability)
         return bool(question.loaded.lowest(question.loaded.root(question.limit))[1])
 
-    below, above = refused, SLIP_PROBABILITIES[1]
-    if not holds(above):
+    below, above = refused, MOST_SLIP
+    if below >= above or not holds(above):
         return None
     while above > 1.001 * below:
         middle = math.sqrt(below * above)
         below, above = (below, middle) if holds(middle) else (middle, above)
-    return min(float(Rounding(prec=3, rounding=ROUND_CEILING).create_decimal_from_float(above)), SLIP_PROBABILITIES[1])
+    return float(Rounding(prec=3, rounding=ROUND_CEILING).create_decimal_from_float(above))
 
 
 def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:

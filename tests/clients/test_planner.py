@@ -248,7 +248,7 @@ def test_a_load_above_the_peak_is_refused_with_the_most_that_can_be_held(make_mo
 
 
 @pytest.mark.parametrize("contact", [Contact.flat(AREA), Contact.round(AREA, 5.0)], ids=["flat", "round"])
-@pytest.mark.parametrize(("load", "limit"), [(3.0, None), (2.0, 6.0)])
+@pytest.mark.parametrize(("load", "limit"), [(3.0, None), (1.6, 6.0)])
 def test_a_refusal_says_which_slip_probability_would_be_held(
     make_model: Make, contact: Contact, load: float, limit: float | None
 ) -> None:
@@ -263,6 +263,15 @@ def test_a_refusal_says_which_slip_probability_would_be_held(
     with pytest.raises(NoFeasibleForce) as again:
         required_normal_force(model, load, 0.985 * least, **asked)  # three digits, rounded up
     assert again.value.least_slip_probability == least
+
+
+def test_no_refusal_offers_to_lose_more_than_one_grasp_in_ten(make_model: Make) -> None:
+    model, asked = make_model(scale=0.05), {"contact_area": AREA, "normal_force_limit": 6.0}
+    assert required_normal_force(model, 2.0, 0.4, **asked).normal_force > 0.0
+    for refused in (1e-3, 0.1, 0.12):
+        with pytest.raises(NoFeasibleForce) as caught:
+            required_normal_force(model, 2.0, refused, **asked)
+        assert caught.value.least_slip_probability is None
 
 
 def test_the_peak_itself_is_still_held(make_model: Make) -> None:

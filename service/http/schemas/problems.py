@@ -52,5 +52,5 @@ class ProblemOut(BaseModel):
         float | None, Field(description="Where no force holds: greatest normal force of an element in the data, N")
     ] = None
     least_slip_probability: Annotated[
-        float | None, Field(description="Where no force holds: the least with which one does; null: none by 0.5")
+        float | None, Field(description="Where no force holds: the least with which one does; null: none by 0.1")
     ] = None
