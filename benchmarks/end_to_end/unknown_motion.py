@@ -85,7 +85,7 @@ def grasp_log(
     for count in range(round(SECONDS / interval)):
         if count % steps == 0:
             frames.append(observe(world, state, generator=rng))
-            poses.append(state.pose)
+            poses.append(state.pose[:3])
         after = _dragged(world, state, law(slipping, normal) * normal, _pose(speed, state.time + interval), interval)
         moved = np.nan_to_num(after.offset[0] - state.offset[0])
         slipping += RELAXED * (np.hypot(*np.moveaxis(moved, -1, 0)) / interval - slipping)
@@ -114,7 +114,7 @@ def _dragged(world: World, state: WorldState, limit: FloatArray, pose: FloatArra
     relax(state.pad, limit.ravel(), pose, force, offset, slips, world.sweeps)
     fields = {"force": force, "offset": offset, "slip": slips}
     shaped = {name: field.reshape(getattr(state, name).shape) for name, field in fields.items()}
-    return state._replace(time=state.time + interval, pose=pose, **shaped)
+    return state._replace(time=state.time + interval, pose=np.concatenate([pose, np.zeros(3)]), **shaped)
 
 
 def grasps(seed: int) -> tuple[FloatArray, list[GraspLog]]:
