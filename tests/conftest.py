@@ -48,6 +48,8 @@ GARBAGE = (10_000, 20, 50)
 at Python's 700, 10 and 10.
 """
 
+ENGINES = ("sqlite", "postgresql")
+
 RAMP_FRAMES = 2000
 """Kept in a process, of 10 to 30 kB each."""
 
@@ -176,7 +178,7 @@ def real_migrations(migrations: Remembered, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("db.migrate.compare_metadata", migrations.real_compare)
 
 
-@pytest.fixture(scope="session", params=["sqlite", "postgresql"])
+@pytest.fixture(scope="session", params=ENGINES)
 def engine_name(request: pytest.FixtureRequest) -> str:
     """Each database that the service runs on."""
     name: str = request.param

@@ -3,6 +3,8 @@ import io
 import itertools
 import threading
 import time
+import zlib
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -35,12 +37,30 @@ from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
 from tests import forking
+from tests.conftest import ENGINES
 from tests.waiting import wait_until
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
 
 Members = dict[str, Any]
+ROOM = Path(__file__).parent
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave each test of the service on one of both databases to ``make test-long``, half of them on each.
+
+    Statements stand in ``db`` alone, whose own tests always take both.
+    """
+    alike = defaultdict(list)
+    for item in items:
+        engine = getattr(getattr(item, "callspec", None), "params", {}).get("engine_name")
+        if engine is not None and ROOM in item.path.parents:
+            alike[item.nodeid.replace(engine, "")].append(item)
+    for name, tests in alike.items():
+        if len(tests) == len(ENGINES):
+            tests[zlib.crc32(name.encode()) % len(ENGINES)].add_marker(pytest.mark.long)
 
 
 @contextmanager
