@@ -35,6 +35,12 @@ def at_least(value: float, digits: int = 3) -> str:
     return number(math.ceil(value / unit - 1e-9) * unit, digits)
 
 
+def renamed(text: str, name: str, told: str) -> str:
+    """What is said of a wrong value, which is ``told`` in place of its ``name``; as it is where it is of another."""
+    rest = text.removeprefix(f"{name} is ")
+    return text if rest == text else f"{told} is {rest}"
+
+
 def further_warning(warning: str | None, advice: str) -> str:
     """What a warning says beyond the advice that stands above it, part of which or all of which it may be."""
     rest = (warning or "").replace(advice, "")

@@ -198,12 +198,12 @@ def required_normal_force(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Question:
-    """What was asked, with the contact's share of the load; ``mean_unit``·x is the mean normal force of its elements,
-    N, and no x below ``above`` holds.
+    """What was asked, with the share of the load of each of ``count`` contacts; ``mean_unit``·x is the mean normal
+    force of its elements, N, and no x below ``above`` holds.
     """
 
     model: FrictionModel
-    contacts: int
+    count: int
     velocity: Number
     probability: Number
     limit: Number
@@ -303,7 +303,7 @@ def _one(
     loaded, most = question.loaded, float(question.loaded.root(question.limit))
     low, high, holds = loaded.interval(most, question.above)
     best = loaded.best(most)
-    per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.contacts)
+    per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.count)
     largest = math.inf if math.isinf(best) else loaded.held(best, per_load) if best > 0.0 else 0.0
     if not holds:
         raise NoFeasibleForce(

@@ -92,8 +92,8 @@ class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
         self.tangential_load, self.reason = math.nan, self.detail  # the load is what was asked
         self.largest_load, self.normal_force = self._number("largest_load"), self._number("normal_force")
         self.cause = str(self.facts.get("cause", ""))
-        self.largest_observed = self.facts.get("largest_observed")
-        self.least_slip_probability = self.facts.get("least_slip_probability")
+        self.largest_observed = self._number_or_none("largest_observed")
+        self.least_slip_probability = self._number_or_none("least_slip_probability")
 
     def _number(self, name: str) -> float:
         """A number of the problem; NaN where it tells none."""
@@ -101,6 +101,11 @@ class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
         if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
             return math.nan
         return float(value)
+
+    def _number_or_none(self, name: str) -> float | None:
+        """The same of one that may be unknown: None where the problem tells none."""
+        value = self._number(name)
+        return None if math.isnan(value) else value
 
 
 class JobEnded(ProblemError):

@@ -304,7 +304,8 @@ def _below_zero(model: Model, tangential_velocity: float, normal_force: float) -
 def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:
     """``uncertainty`` where the law may bend, too."""
     expected, half = map(float, _interval(model, tangential_velocity, normal_force))
-    return math.hypot(half, 1.96 * float(widening(model, tangential_velocity, normal_force))) / expected
+    bend = float(special().ndtri(0.975)) * float(widening(model, tangential_velocity, normal_force))
+    return math.hypot(half, bend) / expected
 
 
 def _ignorance(part: float) -> str:

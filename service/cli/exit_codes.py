@@ -1,5 +1,7 @@
 """Which error ends a command with which exit code."""
 
+from service.formatting import renamed
+
 INPUT_REFUSED = 3
 FAILURE = 1
 SERVICE_REFUSED = 4
@@ -44,8 +46,7 @@ def message(error: Exception) -> str:
 def _by_option(error: Exception, text: str) -> str:
     """What is said of a wrong value, called as the command does."""
     name = getattr(error, "name", None)
-    rest = text.removeprefix(f"{name} is ")
-    return text if rest == text or name not in OPTIONS else f"{OPTIONS[name]} is {rest}"
+    return renamed(text, name, OPTIONS[name]) if name in OPTIONS else text
 
 
 def _of_system(error: OSError) -> str:

@@ -12,8 +12,6 @@ from slipcore.finding import severity_of
 from stiction_client.linear_friction import LinearFriction
 from stiction_client.support import Support
 
-FloatArray = NDArray[np.float64]
-
 COEFFICIENTS = (
     ("β₀", "friction at rest and without load", "no unit"),
     ("β₁", "change of friction with velocity", "per metre a second (s/m)"),
@@ -70,7 +68,9 @@ def record_next(probe: Probe) -> str:
     )
 
 
-def expected_friction(model: LinearFriction, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
+def expected_friction(
+    model: LinearFriction, tangential_velocity: ArrayLike, normal_force: ArrayLike
+) -> NDArray[np.float64]:
     """The law's mean as a line or plane is drawn: 0 where it falls below, far outside of the data."""
     return np.maximum(model.predict(tangential_velocity, normal_force), 0.0)
 
@@ -80,10 +80,7 @@ def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
     force = 0.5 * sum(model.domain.normal_force)
     band = [float(model.predict(0.0, force, quantile=level)) for level in LEVELS]
     facts = [
-        Fact(
-            f"Friction coefficient μ, at {number(force)} N an element",
-            number(float(model.predict(0.0, force))),
-        ),
+        Fact(f"Friction coefficient μ, at {number(force)} N an element", number(float(model.predict(0.0, force)))),
         Fact("90 % of new observations", interval(band)),
     ]
     return facts, model.support_at(0.0, force)

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from service.formatting import renamed
+
 LABELS: Mapping[str, str] = MappingProxyType(
     {
         "material": "Material",
@@ -60,5 +62,5 @@ def named(name: str) -> str:
 
 def labelled_detail(problem: Mapping[str, Any]) -> str:
     """The detail of a problem, in which the value that is wrong is called as in the form that asks for it."""
-    name, detail = str(problem.get("name") or ""), str(problem["detail"])
-    return f"{named(name)} is {rest}" if name and (rest := detail.removeprefix(f"{name} is ")) != detail else detail
+    name = str(problem.get("name") or "")
+    return renamed(str(problem["detail"]), name, named(name))

@@ -72,10 +72,12 @@ def test_the_services_planner_refuses_as_the_clients_does() -> None:
 @pytest.mark.parametrize("told", [None, "3.8", [3.8], {}, True, 10**400])
 def test_a_problem_whose_numbers_are_none_stays_that_problem(told: object) -> None:
     """It had ended in an error of Python's own, which nobody catches who catches this package's."""
+    names = ("largest_load", "normal_force", "largest_observed", "least_slip_probability")
     with (
-        client_of("/problems/no-feasible-force", 409, largest_load=told, normal_force=told) as client,
+        client_of("/problems/no-feasible-force", 409, **dict.fromkeys(names, told)) as client,
         pytest.raises(problems.NoFeasibleForce) as caught,
     ):
         client.material("paper")
     assert math.isnan(caught.value.largest_load)
     assert math.isnan(caught.value.normal_force)
+    assert (caught.value.largest_observed, caught.value.least_slip_probability) == (None, None)

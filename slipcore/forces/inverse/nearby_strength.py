@@ -86,8 +86,8 @@ class TriangularResponse:
             found = self.evidence(strength)
             step, gain = found.step(float(np.log(STRENGTH.largest / strength)))
             strength *= float(np.exp(step))
-            hopeless = abs(step) < 1.0 and found.log_probability + 2.0 * gain < worth
-            if gain < STRENGTH.settled or hopeless:
+            is_worse = abs(step) < 1.0 and found.log_probability + 2.0 * gain < worth
+            if gain < STRENGTH.settled or is_worse:
                 break
         return strength, found.log_probability + gain
 
