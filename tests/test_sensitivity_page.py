@@ -42,10 +42,6 @@ ENTRIES = {
         "which offsets are evaluated once, no result; and of gels not alike thick, on which no press on the page is",
     ),
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
-    "slipcore.forces.STRENGTH": (
-        "settled steps",
-        "evidence by hundredths of a nat; tests/slipcore/forces has it",
-    ),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "filter": (
         "force_floor heading_length",

@@ -74,7 +74,8 @@ def test_a_shape_that_is_known_has_the_strength_that_the_whole_choice_gives_it(
     chosen = choose_prior(observation, data, nodes, support)
     again = choose_strength(observation, data, nodes, support, chosen.smoothness, "evidence")
     assert chosen.smoothness != usual()
-    assert again.strength == pytest.approx(chosen.strength, rel=0.01)
+    # Newton's last step gains 0.2 nats: of 90 coefficients, 0.05 of the strength, and it errs by the square of that.
+    assert again.strength == pytest.approx(chosen.strength, rel=2e-3)
 
 
 def test_the_most_probable_prior_is_found_from_another(nodes: Nodes, support: BoolArray) -> None:
