@@ -11,7 +11,7 @@ import typer
 from service.cli.progress import shown_progress
 
 if TYPE_CHECKING:
-    from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
+    from slipcore import Collected, Finding, GraspLog, SlipHistory
     from slipcore.forces import ForceComparison, Reconstruction
 
 COMPARED_FRAMES = 20
@@ -29,22 +29,21 @@ class InspectedLog:
     seconds: float
     reconstruction: "Reconstruction | None"
 
-    def samples(self) -> "FrictionSamples":
-        """Friction samples, with the noise of reconstructed forces."""
-        from slipcore import collect_samples
+    def friction(self) -> "tuple[Collected, str | None]":
+        """What it says of friction, and if there are no samples, why."""
+        from service.domain.logs.collect_friction import collect
 
-        if self.reconstruction is None:
-            return collect_samples(self.log, self.history)
-        return collect_samples(
-            self.reconstruction.for_samples(self.log), self.history, **self.reconstruction.of_samples
-        )
+        return collect(self.log, self.history, self.reconstruction)
 
-    def findings(self) -> "list[Finding]":
-        """What makes friction from it doubtful."""
+    def findings(self, collected: "Collected") -> "list[Finding]":
+        """What makes friction that was ``collected`` from it doubtful."""
         from service.domain.sensors.reconstruct import reconstruction_findings
         from slipcore import check_log
 
-        return [*reconstruction_findings(self.log, self.reconstruction), *check_log(self.log, self.history)]
+        return [
+            *reconstruction_findings(self.log, self.reconstruction),
+            *check_log(self.log, self.history, collected.elements),
+        ]
 
 
 def inspect_log(

@@ -78,8 +78,9 @@ def check(
     grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = inspect_log(grasp, method, sensor_model, gel)
-    findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
-    without = _without_friction(seen.log)
+    collected, because = seen.friction()
+    findings, contact = seen.findings(collected), _contact_record(seen.log, seen.history)
+    without = _without_friction(seen.log) or because
     compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
         found = [_finding_record(each) for each in findings]
@@ -119,6 +120,7 @@ def fit(
     from estimators.fitting import check_method
     from service.domain.logs.doubtful_logs import with_doubts, with_reconstructed
     from service.domain.logs.same_grasp import Grasps, same_grasp
+    from slipcore import InvalidInput
 
     check_method(method)
     grasps = Grasps()
@@ -126,9 +128,11 @@ def fit(
     def found(path: Path) -> "tuple[str, FrictionSamples, list[Finding]]":
         log = read_log(path, mapping, scale, frame_rate, rest)
         seen = inspect_log(log, detector, sensor_model, gel)
-        if without := _without_friction(seen.log):
+        collected, because = seen.friction()
+        if without := _without_friction(seen.log) or because:
             typer.echo(f"{path.name}: no friction from this log: {without}", err=True)
-        return grasps.see(log, is_touched=bool(seen.history.contact.any())), seen.samples(), seen.findings()
+        own = grasps.see(log, is_touched=bool(seen.history.contact.any()))
+        return own, collected.samples, seen.findings(collected)
 
     first = dict[str, Path]()
     copies: dict[str, list[tuple[FrictionSamples, list[Finding]]]] = {}
@@ -140,6 +144,8 @@ def fit(
         first.setdefault(grasp, path)
         copies.setdefault(grasp, []).append((samples, findings))
     seen = [max(of_grasp, key=lambda each: len(each[0])) for of_grasp in copies.values()]
+    if not any(len(samples) for samples, _ in seen):
+        raise InvalidInput("logs", "without friction samples, for what is said of each above", "one that gives some")
     with shown_progress(f"fitting by {method}"):
         model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
     names = [[finding.name for finding in findings] for _, findings in seen]

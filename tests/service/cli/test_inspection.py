@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.cli.inspection import COMPARED_FRAMES, comparison
-from slipcore import GraspLog, InvalidInput
+from service.cli.inspection import COMPARED_FRAMES, comparison, inspect_log
+from slipcore import FrictionSamples, GraspLog, InvalidInput
 from slipcore.contact.tiers.ramp import tangential_ramp
 from slipcore.forces import Gel, compare_forces, reconstruct
 
@@ -44,3 +44,19 @@ def test_some_frames_of_a_log_compare_as_all_of_them_do(tmp_path: Path) -> None:
     nothing = comparison(still, path)
     assert nothing is not None
     assert np.isnan(nothing.total_normal.ratio)
+
+
+def test_what_is_too_unsure_for_samples_is_told_and_speaks_neither_for_nor_against_friction(tmp_path: Path) -> None:
+    """Checks go by the samples that friction goes by: those of forces that noise hides would follow force."""
+    gel = tmp_path / "gel.json"
+    gel.write_text('{"young_modulus": 1e6, "poisson_ratio": 0.5}', encoding="utf-8")
+    log = tangential_ramp(points=8, pitch=1.5e-3, normal_force=6.0, marker_noise=2e-5, seed=1)
+    seen = inspect_log(replace(log, force=None).take(np.arange(0, len(log), 2)), gel=gel)
+    found, because = seen.friction()
+    assert len(found.samples) == 0
+    assert because is not None
+    assert "too unsure for samples; let all of the contact slide" in because
+    assert [each.name for each in seen.findings(found)] == ["reconstructed forces"]
+    force = np.linspace(0.1, 1.0, 40)
+    falling = FrictionSamples(1.0 - 0.5 * force, 0 * force, force, force, force, np.arange(40), 1.0 + 0 * force, 1e-6)
+    assert "friction follows force" in [each.name for each in seen.findings(found._replace(elements=falling))]
