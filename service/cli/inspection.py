@@ -55,7 +55,7 @@ def inspect_log(
 
     method = method or recommended_method(log)
     log, options = _corrected(log, sensor_model, method)
-    log, reconstruction = _with_forces(log, gel)
+    log, reconstruction = with_forces_by(gel, log)
     begin = perf_counter()
     history = detect_slip(log, method=method, lookahead=LOOKAHEAD, sensor_model=None, **options)
     return InspectedLog(log, history, perf_counter() - begin, reconstruction)
@@ -98,7 +98,7 @@ def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tupl
     return found, dict(options)
 
 
-def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstruction | None]":
+def with_forces_by(gel: Path | None, log: "GraspLog") -> "tuple[GraspLog, Reconstruction | None]":
     """By the gel, if there is one, where the log has none; raises ``UnknownScale`` for one that is not in metres."""
     from service.domain.sensors.reconstruct import with_forces
 

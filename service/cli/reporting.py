@@ -8,7 +8,8 @@ import typer
 
 from service.cli.connection import connected
 from service.cli.inputs import read_log, refuse_inputs
-from service.cli.options import DEFAULT_URL, DETECTOR_HELP, FrameRate, Key, Mapping, Rest, Scale, Url
+from service.cli.inspection import with_forces_by
+from service.cli.options import DEFAULT_URL, DETECTOR_HELP, FrameRate, GelFile, Key, Mapping, Rest, Scale, Url
 
 if TYPE_CHECKING:
     from service.report.page import Report
@@ -32,6 +33,7 @@ def report(
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
     rest: Rest = None,
+    gel: GelFile = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
 ) -> None:
@@ -41,7 +43,7 @@ def report(
     path = Path(what)
     refuse_inputs(output, path, mapping)
     if path.exists():
-        made = _of_log(path, method, scale, frame_rate, mapping, rest)
+        made = _of_log(path, method, scale, frame_rate, mapping, rest, gel)
     elif len(path.parts) > 1:
         raise typer.BadParameter(f"there is no file {what}; allowed: a grasp log, or the name of a material")
     else:
@@ -58,10 +60,12 @@ def _of_log(
     frame_rate: float | None,
     mapping: Path | None,
     rest: str | None,
+    gel: Path | None,
 ) -> "Report":
     from service.domain.logs.grasp_report import report_of_log
 
-    return report_of_log(read_log(path, mapping, scale, frame_rate, rest), path.name, method)
+    log, reconstruction = with_forces_by(gel, read_log(path, mapping, scale, frame_rate, rest))
+    return report_of_log(log, path.name, method, reconstruction)
 
 
 def _of_material(name: str, url: str, key: str | None) -> "Report":

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,31 +12,40 @@ from service import formats
 from service.domain.logs.collect_friction import collect
 from service.domain.logs.doubtful_logs import with_doubts, with_reconstructed
 from service.domain.models.stored_results import StoredHistory, decode_history, decode_samples, summarise_history
+from service.domain.sensors.reconstruct import reconstruction_findings
 from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Fact, Report
 from service.report.pictures import SlipOverTime, detected
 from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, check_log, detect_slip
 from slipcore.method_choice import recommended_method
 
+if TYPE_CHECKING:
+    from slipcore.forces import Reconstruction
+
 METHOD = "auto"
 """By which a grasp alone is fitted."""
 
 
-def report_of_log(log: GraspLog, name: str, method: str | None = None) -> Report:
-    """The report of a log, as a service would see it; ``method``: of detection, the best one where None is named.
+def report_of_log(
+    log: GraspLog, name: str, method: str | None = None, reconstruction: "Reconstruction | None" = None
+) -> Report:
+    """The report of a log, as a service would see it; ``method``: of detection, the best one where None is named;
+    ``reconstruction`` of its forces, where they are not its sensor's.
 
     Raises what ``detect_slip`` raises.
     """
-    return grasp_report(inspect_grasp(log, name, method))
+    return grasp_report(inspect_grasp(log, name, method, reconstruction))
 
 
-def inspect_grasp(log: GraspLog, name: str, method: str | None = None) -> InspectedGrasp:
+def inspect_grasp(
+    log: GraspLog, name: str, method: str | None = None, reconstruction: "Reconstruction | None" = None
+) -> InspectedGrasp:
     """What is found in a log."""
     begin = perf_counter()
     history = detect_slip(log, method=method or recommended_method(log), lookahead=LOOKAHEAD)
     seconds = perf_counter() - begin
-    found, none_because = collect(log, history, None)
-    findings = check_log(log, history, found.elements)
+    found, none_because = collect(log, history, reconstruction)
+    findings = [*reconstruction_findings(log, reconstruction), *check_log(log, history, found.elements)]
     detection = summarise_history(history, seconds, "", findings, found.contact, is_scaled=log.is_scaled)
     facts = grasp_facts(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
     model, refusal = _fitted(found.samples, [finding.name for finding in findings], none_because)

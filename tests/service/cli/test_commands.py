@@ -1033,6 +1033,15 @@ def test_a_log_without_forces_is_looked_at_by_its_gel(run: Run, felt: Path, gel:
     assert without["contact_friction"] is None
 
 
+def test_a_report_of_a_log_without_forces_is_by_its_gel(run: Run, felt: Path, gel: Path, tmp_path: Path) -> None:
+    log, page = formats.read(felt), tmp_path / "report.html"
+    few = without_forces(log.take(np.linspace(0, len(log) - 1, 8, dtype=int)), tmp_path / "few.npz")
+    assert run("report", few, "-o", page)[0] == 0
+    assert "the log has no forces" in page.read_text(encoding="utf-8")
+    assert run("report", few, "--gel", gel, "-o", page)[0] == 0
+    assert "reconstructed forces: friction is as sure" in page.read_text(encoding="utf-8")
+
+
 def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(
     run: Run, felt: Path, gel: Path, tmp_path: Path
 ) -> None:

@@ -19,6 +19,7 @@ from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Report, render
 from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.forces import Gel, reconstruct
 from stiction_client.container import encode
 
 SHORT = RampSchedule(rest=0.1, press=0.3, settle=0.1, shear=0.6, hold=0.1)
@@ -52,6 +53,15 @@ def test_a_log_is_reported_as_it_is_seen(log: GraspLog, seen: InspectedGrasp) ->
         return re.sub(r"[\d.]+ (ms|s)\b", "", f"{report.title} {report.lead} {report.facts} {report.steps}")
 
     assert without_seconds(report_of_log(log, "grasp.npz")) == without_seconds(grasp_report(seen))
+
+
+def test_forces_that_no_sensor_measured_are_told(log: GraspLog) -> None:
+    few = replace(log, force=None).take(np.linspace(0, len(log) - 1, 8, dtype=int))
+    found = reconstruct(few, Gel(1e6, 0.5))
+    steps = report_of_log(found.apply(few), "grasp.npz", reconstruction=found).steps
+    assert steps[0] == "reconstructed forces: friction is as sure as the description of the sensor's gel."
+    steps = report_of_log(found.apply(few), "grasp.npz").steps
+    assert steps[0].startswith("forces not checked: ")
 
 
 def told(inspected: InspectedGrasp) -> dict[str, str]:
