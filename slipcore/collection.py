@@ -9,6 +9,7 @@ from slipcore.defaults import COLLECTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.friction import contact_friction
 from slipcore.patch_record import ContactFriction, Patch, bounds_of, frames_of, joined
+from slipcore.repeated_frames import of_own
 from slipcore.samples import KIND, FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
 
@@ -38,6 +39,7 @@ def collect_friction(log: GraspLog, history: SlipHistory, **options: float) -> C
     whose lengths are not in metres, ``InvalidInput`` for a history of another log and for bad options.
     """
     elements = element_samples(log, history, **options)
+    log, history = of_own(log, history)
     contact = contact_friction(log.time, history.patches)
     left_out = None if contact is None or not len(elements) else contradiction(elements, contact, history.patches)
     kept = elements.take(np.full(len(elements), left_out is None))

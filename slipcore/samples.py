@@ -12,6 +12,7 @@ from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.repeated_frames import of_own
 from slipcore.slip_state import SlipHistory
 from slipcore.surface.log_normals import normals_of
 
@@ -150,7 +151,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     frame before to the next, and its normal force is what these two say; f_t/f_n alone is of the frame itself, freed of
     what noise adds to a magnitude and to a quotient. Where pressure p differs over an element, friction that goes with
     it is that of ∫p²/∫p, not of the mean (``_as_friction_averages``). A log without (observable) slip gives no samples,
-    of length 0.
+    of length 0, and repeated frames give none of their own.
     ``options``: see ``defaults.SampleOptions``.
     Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one whose lengths and velocities are not in
     metres, ``InvalidInput`` for a history of another log and for bad options.
@@ -161,6 +162,8 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     if log.force is None:
         raise NoForces("friction samples need the force on each element, and the log has none")
     _check_same(log, history)
+    log, history = of_own(log, history)
+    assert log.force is not None
     forces = element_forces(log.force, normals_of(log))
     noise = _force_noise(log, forces, chosen)
     velocity, velocity_noise = _central_velocity(log.time, history.velocity), _velocity_noise(log, history)

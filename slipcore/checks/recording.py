@@ -5,8 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from slipcore.checks.subject import Subject
+from slipcore.defaults import LIMITS
 from slipcore.finding import Finding
 from slipcore.frames import BoolArray
+from slipcore.repeated_frames import repeated
 from slipcore.saturation import saturated
 
 
@@ -55,12 +57,9 @@ def element_area(seen: Subject) -> Iterator[Finding]:
 
 def repeated_frames(seen: Subject) -> Iterator[Finding]:
     """A sensor that is slower than its recorder, or frozen."""
-    fields = [field for field in (seen.log.displacement, seen.log.force) if field is not None and field.any()]
-    if not fields or len(seen.log) < 3:
-        return
-    same = np.logical_and.reduce([(field[1:] == field[:-1]).all(axis=(1, 2, 3)) for field in fields])
-    if same.mean() > seen.limits.repeated_share:
-        evidence = f"{same.mean():.0%} of the frames are copies of the one before"
+    share = float(repeated(seen.log)[1:].mean())
+    if len(seen.log) > LIMITS.min_frames and share > seen.limits.repeated_share:
+        evidence = f"{share:.0%} of the frames are copies of the one before"
         yield Finding("repeated frames", evidence, "record each frame once, with the time at which the sensor took it")
 
 

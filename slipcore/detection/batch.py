@@ -21,6 +21,7 @@ from slipcore.finding import Finding
 from slipcore.frames import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.regimes import slips_as_a_whole
+from slipcore.repeated_frames import own_frames, with_repeated
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
 from slipcore.surface.log_normals import with_normals
 
@@ -39,7 +40,8 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Forces that are clearly late, or
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Frames that a recorder wrote
+    again count as the one that they repeat (``repeated_frames``). Forces that are clearly late, or
     have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
     smoothed, as far as the log's noise shows how widely, unless options give it, and takes reconstructed forces as
     ``for_reconstructed_forces`` says. A log without displacement is left to method "forces_only" where the
@@ -61,6 +63,10 @@ def detect_slip(
         options = {**known, **options}
     if log.force_deviation and method == DEFAULT_METHOD:
         options = {**for_reconstructed_forces(log.force_deviation), **options}
+    own = own_frames(log)
+    if not own.all():
+        found = detect_slip(log.take(own), method, lookahead=lookahead, sensor_model=None, **options)
+        return with_repeated(found, log, own)
     log, mended = agreeing(with_normals(log))
     kernel_width = options.pop("kernel_width", 0.0)
     estimated = {}
@@ -70,8 +76,7 @@ def detect_slip(
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         history = history_of(log, state, checked_lookahead(lookahead))
-        found = mended + history.findings + smoothing_found(estimated)
-        history = replace(history, findings=_in_its_units(found, log))
+        history = replace(history, findings=_in_its_units(mended + history.findings + smoothing_found(estimated), log))
         return with_patches(log, history, kernel_width=kernel_width)
     smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():

@@ -185,6 +185,13 @@ def test_a_fault_is_found_by_name(long_ramp: GraspLog, fault: str) -> None:
     assert fault in names(FAULTS[fault](long_ramp))
 
 
+def test_zeros_by_which_a_sensor_says_that_nothing_touches_are_no_copies(long_ramp: GraspLog) -> None:
+    gated = long_ramp.displacement.copy(), np.array(long_ramp.force)
+    for field in gated:
+        field[:21] = 0.0
+    assert "repeated frames" not in names(replace(long_ramp, displacement=gated[0], force=gated[1], normal=None))
+
+
 def test_nothing_is_found_in_a_log_without_fault(long_ramp: GraspLog, short_ramp: GraspLog) -> None:
     assert names(long_ramp) == set()
     assert names(short_ramp) == set()

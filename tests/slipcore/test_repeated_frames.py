@@ -1,0 +1,86 @@
+"""What a recorder wrote again, for its sensor had nothing new, changes nothing in what is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, collect_friction, contact_friction, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.repeated_frames import own_frames, repeated
+
+
+def again(log: GraspLog, source: np.ndarray, time: np.ndarray) -> GraspLog:
+    """The frames ``source`` of a log at other times."""
+    fields = {
+        name: None if (field := getattr(log, name)) is None else field[source]
+        for name in ("displacement", "force", "normal", "observed")
+    }
+    return replace(log, time=time, truth=None, object_pose=None, **fields)
+
+
+@pytest.mark.parametrize("lookahead", [0, 2])
+@pytest.mark.parametrize("method", ["filter", "coarse", "force_ratio"])
+def test_a_recorder_that_is_quicker_than_its_sensor_changes_nothing(
+    short_ramp: GraspLog, method: str, lookahead: int
+) -> None:
+    log = replace(short_ramp, truth=None, object_pose=None)
+    source = np.sort(np.append(np.repeat(np.arange(len(log)), 2), [7, 30]))  # two of them three times
+    time = log.time[source] + (np.arange(len(source)) - np.searchsorted(source, source)) / 100.0
+    twice = again(log, source, time)
+    own, found = detect_slip(log, method, lookahead=lookahead), detect_slip(twice, method, lookahead=lookahead)
+    assert own.slip.any()
+    for name in ("contact", "slip", "probability", "velocity", "macro_slip", "stick_ratio"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(own, name)[source], strict=True)
+    assert [len(getattr(found.events, name)) for name in ("onset", "end", "touch", "release")] == [
+        len(getattr(own.events, name)) for name in ("onset", "end", "touch", "release")
+    ]
+    assert found.findings == own.findings
+    for one, other in zip(own.patches, found.patches, strict=True):
+        within = source[other.frames] - one.first
+        np.testing.assert_array_equal(other.regime, one.regime[within])
+        np.testing.assert_array_equal(
+            source[[other.frames.start, other.frames.stop - 1]], [one.first, one.frames.stop - 1]
+        )
+    friction = contact_friction(log.time, own.patches), contact_friction(time, found.patches)
+    assert friction[0] is not None
+    assert friction[1] is not None
+    assert friction[1].low == pytest.approx(friction[0].low, rel=0.03)
+
+
+def test_repeated_frames_give_no_samples_of_their_own() -> None:
+    """The frame before, by which an element is chosen, would have the same noise; and all would count twice."""
+    schedule = RampSchedule(rest=0.2, press=0.3, settle=0.1, shear=1.5, hold=0.1)
+    log = replace(
+        tangential_ramp(points=14, pitch=1e-3, schedule=schedule, marker_noise=1e-6, force_noise=2e-3), truth=None
+    )
+    log = replace(log, object_pose=None)
+    source = np.repeat(np.arange(len(log)), 2)
+    time = log.time[source] + np.tile([0.0, 0.01], len(log))
+    twice = again(log, source, time)
+    own, found = (collect_friction(each, detect_slip(each)) for each in (log, twice))
+    assert len(own.samples) > 20
+    np.testing.assert_array_equal(found.samples.friction_coefficient, own.samples.friction_coefficient)
+    np.testing.assert_array_equal(found.samples.tangential_velocity, own.samples.tangential_velocity)
+    np.testing.assert_array_equal(found.samples.time, own.samples.time)
+    assert found.contact == own.contact
+
+
+def test_what_stands_still_for_longer_than_a_recorder_waits_stays(short_ramp: GraspLog) -> None:
+    source = np.sort(np.append(np.arange(len(short_ramp)), np.full(20, 30)))
+    time = short_ramp.time[0] + np.arange(len(source)) / 30.0
+    still = again(short_ramp, source, time)
+    assert np.count_nonzero(repeated(still)) == 20
+    assert own_frames(still).all()
+    assert own_frames(replace(still, time=time / 2.0)).sum() == len(short_ramp)
+
+
+def test_a_marker_that_is_lost_or_found_makes_a_frame_of_its_own(short_ramp: GraspLog) -> None:
+    source = np.repeat(np.arange(len(short_ramp)), 2)
+    observed = np.ones((len(source), *short_ramp.grid), bool)
+    observed[21, 3, 3] = False
+    doubled = replace(again(short_ramp, source, np.arange(len(source)) / 60.0), observed=observed)
+    own = own_frames(doubled)
+    assert own[21]
+    assert own[22]
+    assert own.sum() == len(short_ramp) + 1
