@@ -15,6 +15,7 @@ SEVERITIES: dict[str, Severity] = {
     "another's gel": "note",
     "slow frames": "note",
     "no displacement": "note",
+    "no contact": "note",
     "places for displacement": "warning",
     "element area": "warning",
     "repeated frames": "note",

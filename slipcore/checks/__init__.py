@@ -24,6 +24,7 @@ __all__ = ["AGAINST_FRICTION", "Finding", "check_log"]
 CHECKS: tuple[Check, ...] = (
     recording.time_unit,
     recording.still_markers,
+    recording.no_contact,
     recording.places_for_displacement,
     recording.element_area,
     recording.repeated_frames,

@@ -7,9 +7,35 @@ import numpy as np
 from slipcore.checks.subject import Subject
 from slipcore.defaults import LIMITS
 from slipcore.finding import Finding
-from slipcore.frames import BoolArray
+from slipcore.frames import BY_MOTION, BoolArray, GraspLog
 from slipcore.repeated_frames import repeated
 from slipcore.saturation import saturated
+
+
+def no_contact(seen: Subject) -> Iterator[Finding]:
+    """A log in which nothing is found to touch, of which there is nothing else to say."""
+    if seen.history.contact.any():
+        return
+    because, remedy = _without_contact(seen.log)
+    yield Finding("no contact", f"no element touches in any of the {len(seen.log)} frames: {because}", remedy)
+
+
+def _without_contact(log: GraspLog) -> tuple[str, str]:
+    """Why nothing touches, by that from which contact is found, and what to do."""
+    if log.contact is not None:
+        if log.metadata.get("contact") == BY_MOTION:
+            return "no marker moves beyond noise", "load the object sideways, or say what touches in `contact`"
+        return "the log's own `contact` says so", "give in `contact` what touches, or leave it out"
+    if log.force is not None and not log.has_reconstructed_force:
+        largest = float(np.linalg.norm(log.force, axis=-1).max())
+        return f"the largest force on one is {largest:.2g} N", "make sure that force is in N, and of what is recorded"
+    if not log.displacement[..., 2].any():
+        return "markers are seen in the plane alone", "say what touches in `contact`, or give z or forces"
+    deepest = max(-float(log.displacement[..., 2].min()), 0.0) / np.sqrt(log.element_area)
+    return (
+        f"markers are pressed in by {deepest:.2g} of an element's width at most",
+        "turn displacement along z so that it points outwards: what is pressed in has z below 0",
+    )
 
 
 def time_unit(seen: Subject) -> Iterator[Finding]:

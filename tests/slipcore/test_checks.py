@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from slipcore.checks.subject import Subject
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.contradicting_forces import EARLY, LATE
 from slipcore.finding import SEVERITIES
+from slipcore.frames import BY_MOTION
 from slipcore.surface.log_normals import normals_of
 from tests.slipcore.conftest import RECORDED
 
@@ -157,6 +158,7 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
     "places for displacement": with_places,
     "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
+    "no contact": lambda log: with_force(log, 1e-4 * np.asarray(log.force)),
     "repeated frames": doubled,
     "force too large": lambda log: with_force(log, 1e2 * np.asarray(log.force)),
     "displacement too small": lambda log: replace(log, displacement=1e-3 * log.displacement),
@@ -183,6 +185,26 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_found_by_name(long_ramp: GraspLog, fault: str) -> None:
     assert fault in names(FAULTS[fault](long_ramp))
+
+
+@pytest.mark.parametrize(
+    ("changes", "because"),
+    [
+        ({"axes": [1.0, 1.0, 0.0]}, "in the plane alone"),
+        ({"axes": [1.0, 1.0, -1.0]}, "pressed in by 0.00"),
+        ({"contact": False}, "own `contact` says so"),
+        ({"contact": False, "metadata": {"contact": BY_MOTION}}, "no marker moves"),
+    ],
+)
+def test_why_nothing_touches_is_said(short_ramp: GraspLog, changes: dict[str, Any], because: str) -> None:
+    given = {name: value for name, value in changes.items() if name != "axes"}
+    if "contact" in given:
+        given["contact"] = np.zeros(short_ramp.displacement.shape[:3], bool)
+    moved = short_ramp.displacement * changes.get("axes", 1.0)
+    log = replace(short_ramp, force=None, normal=None, displacement=moved, **given)
+    (found,) = check_log(log, detect_slip(log))
+    assert found.name == "no contact"
+    assert because in found.evidence
 
 
 def test_zeros_by_which_a_sensor_says_that_nothing_touches_are_no_copies(long_ramp: GraspLog) -> None:
