@@ -305,7 +305,7 @@ def check_span(first: float, last: float) -> None:
 
 def check_displacement(displacement: FloatArray, position: FloatArray) -> None:
     """Of markers at rest at ``position``, m: that they could have moved so far."""
-    _check_magnitude("displacement", displacement, _largest_displacement(position), "m (is it in m?)")
+    _check_magnitude("displacement", displacement, _largest_displacement(position), "m", " (is it in m?)")
 
 
 def check_gripper_report(force: float | None, deviation: float | None, largest: float = 0.0) -> None:
@@ -414,12 +414,12 @@ def _check_time(time: FloatArray) -> None:
         raise InvalidInput("time", f"{median:.3g} s between frames", f"{low:g} to {high:g} s (is it in s?)")
 
 
-def _check_magnitude(name: str, array: FloatArray | None, limit: float, unit: str) -> None:
+def _check_magnitude(name: str, array: FloatArray | None, limit: float, unit: str, question: str = "") -> None:
     if array is None:
         return
     largest = max(float(array.max()), -float(array.min()))  # |array| would be another array
     if largest > limit:
-        raise InvalidInput(name, f"{largest:.3g} {unit} at its largest", f"at most {limit:g} {unit}")
+        raise InvalidInput(name, f"{largest:.3g} {unit} at its largest", f"at most {limit:g} {unit}{question}")
 
 
 def _check_pose(pose: FloatArray | None) -> None:
