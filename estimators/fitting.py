@@ -9,7 +9,7 @@ from estimators.linear.priors import ScatterPrior
 from estimators.method_names import METHODS, SCATTER_METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
 from estimators.methods.automatic import choose, compared
-from estimators.methods.reporting import Diagnostics, areas_of_sensors, element_areas
+from estimators.methods.reporting import Diagnostics, areas_of_sensors, element_areas, only_sensor
 
 
 def needs_samples(method: str, grasps: int) -> bool:
@@ -66,13 +66,13 @@ def fit(
     if scatter_prior is not None and (method not in SCATTER_METHODS or likelihood not in {None, "hierarchical"}):
         raise InvalidSamples("scatter_prior", scatter_prior, f"none but with {', '.join(SCATTER_METHODS)}")
     scatter_prior = scatter_prior or ScatterPrior()
-    data, areas = gather(samples), element_areas(samples)
+    data, origin = gather(samples), element_areas(samples) | only_sensor(samples)
     if method != "auto":
         model = _fit(data, method, accuracy, seconds, seed, likelihood, loss, scatter_prior)
-        return _with_areas(model, samples, areas)
+        return _with_areas(model, samples, origin)
     choice = choose(data)
     model = hierarchical.fit(choice.data, scatter_prior)
-    added = {"chosen_because": choice.reason, "check": compared(model, choice.data), **areas}
+    added = {"chosen_because": choice.reason, "check": compared(model, choice.data), **origin}
     return _with_areas(model, samples, added)
 
 

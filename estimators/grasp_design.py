@@ -83,7 +83,8 @@ class NextGrasp:
     rad of the slip; ``seconds`` that it takes.
 
     ``uncertainty``: half-width of the 95 % interval of the friction expected at the working point, now and as it is
-    expected ``after``; ``conservative_friction`` there now.
+    expected ``after``; ``conservative_friction`` there now; ``beyond``: a sentence where it presses harder than any
+    grasp of the model did.
     """
 
     normal_force: float
@@ -94,6 +95,7 @@ class NextGrasp:
     uncertainty: float
     after: float
     conservative_friction: float
+    beyond: str | None = None
 
 
 def next_grasp(
@@ -125,6 +127,7 @@ def next_grasp(
         uncertainty=score * math.sqrt(variance),
         after=score * float(after[best]),
         conservative_friction=float(conservative),
+        beyond=_beyond(float(designs.normal_force[best]), model.domain.normal_force[1]),
     )
 
 
@@ -198,14 +201,28 @@ class Designs:
 
 
 def scatter(model: FrictionModel) -> tuple[float, float, float]:
-    """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not separate them."""
+    """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not separate them.
+
+    Sensors' gains count as scatter of grasps where they are of several: what β is between sensors one grasp does not
+    say.
+    """
     least = DESIGN.least_scatter * max(abs(float(model.coefficients[0])), DESIGN.least_scatter)
     if model.scales is None:
         middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
         friction = abs(float(np.dot(middle, model.coefficients)))
         return model.scale / max(friction, least), 0.0, max(model.scale, least)
     scales: Scales = model.scales
-    return scales.between_grasps.value, scales.between_places.value, max(scales.within.value, least)
+    gains = 0.0 if scales.between_sensors is None else scales.between_sensors.scale.value
+    between = math.hypot(scales.between_grasps.value, gains)
+    return between, scales.between_places.value, max(scales.within.value, least)
+
+
+def _beyond(normal_force: float, most: float) -> str | None:
+    """That a grasp presses harder, N an element, than the ``most`` of those before."""
+    if normal_force <= most:
+        return None
+    harder = f"{normal_force:.4g} N an element is more than any grasp had so far ({most:.4g})"
+    return f"{harder}: make sure that sensor and object bear it"
 
 
 def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> FloatArray:

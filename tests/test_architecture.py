@@ -703,6 +703,7 @@ def parameters(path: Path) -> dict[str, list[ast.arg]]:
 WIDE = {
     f"{CLIENT}/planner.py required_normal_force": "the contract's, all of its options by keyword",
     f"{CLIENT}/client.py friction": "public, and all but five by keyword",
+    f"{CLIENT}/client.py next_grasp": "public, and all but five by keyword",
     f"{CLIENT}/stream.py __init__": "public, and all but three by keyword",
 }
 """Functions that take more, with the reason. A command has a parameter for each of its options."""

@@ -189,14 +189,15 @@ class FrictionClient:
         method: str | None = None,
         load: float = 0.0,
         drop_probability: float = 1e-3,
+        sensor: str | None = None,
     ) -> NextGrasp:
         """What to record next, to know friction at ``fn`` N an element and ``v`` m/s best per second of robot time.
 
         Without ``fn`` in the middle of the data; ``quantile`` and ``elements`` as a planner asks for them. The contact
-        bears ``load`` N meanwhile, which it drops with at most ``drop_probability``.
+        bears ``load`` N meanwhile, which it drops with at most ``drop_probability``. ``sensor``: that grasps.
         """
         asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
-        bounds = {"load": load, "drop_probability": drop_probability}
+        bounds = {"load": load, "drop_probability": drop_probability, "sensor": sensor}
         return self._run(calls.next_grasp(name, asked | bounds, self._names))
 
     def recognise(
@@ -427,10 +428,11 @@ class AsyncFrictionClient:
         method: str | None = None,
         load: float = 0.0,
         drop_probability: float = 1e-3,
+        sensor: str | None = None,
     ) -> NextGrasp:
         """As ``FrictionClient.next_grasp``."""
         asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
-        bounds = {"load": load, "drop_probability": drop_probability}
+        bounds = {"load": load, "drop_probability": drop_probability, "sensor": sensor}
         return await self._run(calls.next_grasp(name, asked | bounds, self._names))
 
     async def recognise(

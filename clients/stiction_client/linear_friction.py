@@ -13,7 +13,17 @@ from stiction_client import json_values
 from stiction_client.arguments import shown
 from stiction_client.elementwise import FloatArray, Number, special
 from stiction_client.errors import InvalidArgument
-from stiction_client.support import UNKNOWN_SENSOR, Domain, Kind, Support, extrapolation, notes, support, widening
+from stiction_client.support import (
+    ONLY_SENSOR,
+    UNKNOWN_SENSOR,
+    Domain,
+    Kind,
+    Support,
+    extrapolation,
+    notes,
+    support,
+    widening,
+)
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
@@ -250,15 +260,17 @@ class LinearFriction:
     def of_sensor(self, name: str) -> Self:
         """The model of friction as the sensor of this name shows it, its own gain in the coefficients.
 
-        Where all grasps are of one sensor, the model itself. Of a sensor of which it has no grasp too, but for a note
-        that says so: its quantiles allow for the gain of any sensor.
+        Where all grasps are of this sensor, the model itself. Of a sensor of which it has no grasp too, but for a note
+        that says whether its quantiles allow for the gain of any sensor; and where nobody noted which sensors its
+        grasps are of, or its method does not separate them.
         """
-        known = None if self.scales is None else self.scales.between_sensors
-        if self.scales is None or known is None:
-            return self
-        if name not in known.sensors:
-            return self._of_unknown_sensor(name, known.sensors)
-        sensor = known.sensors[name]
+        scales = self.scales
+        if scales is None or scales.between_sensors is None:
+            return self if name == self.diagnostics.get(ONLY_SENSOR) else self._of_no_known_gain(name)
+        if name not in scales.between_sensors.sensors:
+            known = f"no grasp of it is by a sensor {name!r}{_near(name, scales.between_sensors.sensors)}"
+            return self._noting(f"{known}: the answer allows for the gain of any sensor")
+        sensor = scales.between_sensors.sensors[name]
         return replace(  # type: ignore[type-var]  # every model is a record
             self,
             coefficients=np.array(sensor.coefficients),
@@ -266,7 +278,7 @@ class LinearFriction:
             degrees_of_freedom=sensor.degrees_of_freedom,
             scale=sensor.scale,
             scatter_degrees_of_freedom=sensor.scatter_degrees_of_freedom,
-            scales=replace(self.scales, between_sensors=None),
+            scales=replace(scales, between_sensors=None),
         )
 
     def on_sensor(self, name: str) -> Self:
@@ -296,9 +308,16 @@ class LinearFriction:
             element_area=area,
         )
 
-    def _of_unknown_sensor(self, name: str, known: Iterable[str]) -> Self:
-        near = "".join(f" (did you mean {each!r}?)" for each in difflib.get_close_matches(name, known, n=1))
-        note = f"no grasp of it is by a sensor {name!r}{near}: the answer allows for the gain of any sensor"
+    def _of_no_known_gain(self, name: str) -> Self:
+        """Of a model that separates no sensors, as another sensor than its own shows it."""
+        only = self.diagnostics.get(ONLY_SENSOR)
+        if only is None:
+            known = "this fit does not separate the sensors of its grasps"
+        else:
+            known = f"all grasps of it are by a sensor {only!r}, none by {name!r}{_near(name, [str(only)])}"
+        return self._noting(f"{known}: the answer does not allow for the gain of another sensor")
+
+    def _noting(self, note: str) -> Self:
         return replace(self, diagnostics={**self.diagnostics, UNKNOWN_SENSOR: note})  # type: ignore[type-var]
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
@@ -387,6 +406,11 @@ def check_model(model: object) -> None:
     """Raises ``InvalidArgument`` for what is no fitted model."""
     if not isinstance(model, LinearFriction):
         raise InvalidArgument("model", shown(model), "a FrictionModel, as FrictionClient.model(name) gives it")
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    """A question after the known name that this one may be meant for, if it is like any."""
+    return "".join(f" (did you mean {each!r}?)" for each in difflib.get_close_matches(name, known, n=1))
 
 
 def degrees_to_json(value: float) -> float | None:

@@ -245,7 +245,8 @@ class NextGrasp:
     and ``direction`` rad of the slip; ``seconds`` that it takes.
 
     ``uncertainty``: half-width of the 95 % interval of the friction expected at the working point, and as it is
-    expected ``after``; ``conservative_friction``, ``support`` and ``advice`` of what is known there now.
+    expected ``after``; ``conservative_friction``, ``support`` and ``advice`` of what is known there now; ``beyond``: a
+    sentence where it presses harder than any grasp so far; ``notes``: what else is to be known of the model.
     """
 
     material: str
@@ -261,11 +262,13 @@ class NextGrasp:
     conservative_friction: float
     support: str
     advice: str
+    beyond: str | None = None
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "NextGrasp":
         """The grasp in the service's answer; raises ``ValueError`` for numbers that no grasp has."""
-        values = _values(cls, record)
+        values = _values(cls, record) | {"notes": tuple(record.get("notes", ()))}
         values["normal_force"] = json_values.number("normal_force", values["normal_force"], above=0.0)
         for name in ("slip_length", "speed", "seconds", "uncertainty", "after"):
             values[name] = json_values.number(name, values[name], least=0.0)

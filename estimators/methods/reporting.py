@@ -20,7 +20,7 @@ from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
 from estimators.methods.identifiability import effects, identifiable, takes_as_independent, what_to_record
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
-from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, SENSOR_GAIN
+from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, ONLY_SENSOR, SENSOR_GAIN
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -66,6 +66,12 @@ def areas_of_sensors(samples: GraspData) -> dict[str, float]:
         for name in named:
             areas[name] = min(areas.get(name, math.inf), part.element_area)
     return areas
+
+
+def only_sensor(samples: GraspData) -> Diagnostics:
+    """The name of the sensor that all grasps are of, where there is one."""
+    names = [*areas_of_sensors(samples)]
+    return {ONLY_SENSOR: names[0]} if len(names) == 1 and names[0] else {}
 
 
 def sensor_gain(nodes: ScaleNodes) -> Diagnostics:

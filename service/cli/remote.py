@@ -122,6 +122,7 @@ def next_grasp(
     elements: Annotated[int, typer.Option(min=1, help="Elements of the planner's contact.")] = 60,
     load: Annotated[float, typer.Option(help="Load that the contact bears while it is probed, N.")] = 0.0,
     drop_probability: Annotated[float, typer.Option(help="With which it may drop that load.")] = 1e-3,
+    sensor: GraspingSensor = None,
     method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -139,6 +140,7 @@ def next_grasp(
             method=method,
             load=load,
             drop_probability=drop_probability,
+            sensor=sensor,
         )
     if json:
         print_json(asdict(grasp))
@@ -315,6 +317,8 @@ def _probe_lines(grasp: "NextGrasp") -> list[tuple[str, str | None]]:
         ("takes", f"{number(grasp.seconds)} s"),
         ("known to", f"± {number(grasp.uncertainty)} now, ± {number(grasp.after)} after that"),
         ("support", f"{grasp.support}: {grasp.advice}"),
+        ("mind", grasp.beyond),
+        *(("note", note) for note in grasp.notes),
     ]
 
 

@@ -58,6 +58,10 @@ class Probe(Protocol):
     def after(self) -> float:
         """The same with this grasp."""
 
+    @property
+    def beyond(self) -> str | None:
+        """A sentence where it presses harder than any grasp so far."""
+
 
 def record_next(probe: Probe) -> str:
     """What to record next, and what that is good for."""
@@ -65,6 +69,7 @@ def record_next(probe: Probe) -> str:
         f"Record next: press with {number(probe.normal_force)} N on an element and let it slip by "
         f"{number(probe.slip_length * 1e3)} mm at {number(probe.speed * 1e3)} mm/s. The expected friction, known to "
         f"± {number(probe.uncertainty)}, is then known to ± {number(probe.after)}."
+        f"{f' Mind: {probe.beyond}.' if probe.beyond else ''}"
     )
 
 

@@ -143,16 +143,18 @@ NEXT_GRASP = {
     "conservative_friction": 0.31,
     "support": "not identified",
     "advice": "record more grasps",
+    "notes": ["one sensor"],
 }
 
 
 def test_what_to_record_next_is_asked_for(ask: Ask, service: Service) -> None:
     server = service(NEXT_GRASP)
-    answer = ask(server, "next_grasp", "paper", 0.05, load=1.0)
+    answer = ask(server, "next_grasp", "paper", 0.05, load=1.0, sensor="left")
     assert server.requests[0].url.path == "/v1/materials/paper/next-grasp"
     asked = {"fn": "0.05", "v": "0.0", "quantile": "0.01", "elements": "60", "load": "1.0", "drop_probability": "0.001"}
-    assert dict(server.requests[0].url.params) == asked
+    assert dict(server.requests[0].url.params) == asked | {"sensor": "left"}
     assert (answer.normal_force, answer.after, answer.support) == (0.05, 0.04, "not identified")
+    assert (answer.beyond, answer.notes) == (None, ("one sensor",))
 
 
 def test_a_material_is_created(ask: Ask, service: Service, answers: SimpleNamespace) -> None:

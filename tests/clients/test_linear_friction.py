@@ -129,7 +129,8 @@ def test_a_known_sensor_answers_by_itself_and_by_its_own_elements_where_these_ar
     assert left.scales == SCALES
     assert SENSED.on_sensor("left").element_area == 1.12e-6
     assert SENSED.on_sensor("left").coefficients[2] == pytest.approx(-0.1 / (1.12e-6 / SENSED.element_area))
-    for same in (PLAIN, SCALED):
+    for model in (PLAIN, SCALED):
+        same = replace(model, diagnostics={"sensor": "left"})
         assert same.of_sensor("left") is same
         assert same.on_sensor("left") is same
     unknown = SENSED.on_sensor("lefft")
@@ -138,6 +139,20 @@ def test_a_known_sensor_answers_by_itself_and_by_its_own_elements_where_these_ar
         "no grasp of it is by a sensor 'lefft' (did you mean 'left'?): the answer allows for the gain of any sensor",
     )
     assert "did you mean" not in SENSED.of_sensor("xyz").notes[0]
+
+
+def test_a_model_that_separates_no_sensors_says_so_where_another_than_its_own_is_asked_for() -> None:
+    alone = replace(SCALED, diagnostics={"sensor": "left"})
+    other = alone.on_sensor("lefft")
+    assert other.notes == (
+        "all grasps of it are by a sensor 'left', none by 'lefft' (did you mean 'left'?): "
+        "the answer does not allow for the gain of another sensor",
+    )
+    assert other.predict(*INSIDE, 0.05) == alone.predict(*INSIDE, 0.05)
+    assert PLAIN.of_sensor("left").notes == (
+        "this fit does not separate the sensors of its grasps: "
+        "the answer does not allow for the gain of another sensor",
+    )
 
 
 def test_scales_and_sensors_come_back_from_json_and_infinity_is_null() -> None:

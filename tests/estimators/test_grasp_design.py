@@ -6,7 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimators import Cost, Domain, FrictionModel, InvalidSamples, Probing, Scale, Scales, WorkingPoint, next_grasp
+from estimators import (
+    Cost,
+    Domain,
+    FrictionModel,
+    InvalidSamples,
+    Probing,
+    Scale,
+    Scales,
+    SensorScale,
+    WorkingPoint,
+    next_grasp,
+)
 from estimators.grasp_design import GOLDEN_ANGLE, SPEEDS, Designs, _forces, scatter, updated
 
 POINT = WorkingPoint(0.1)
@@ -72,6 +83,24 @@ def test_a_slope_is_asked_for_far_out_and_a_level_where_it_is_needed() -> None:
     for force in (0.03, 0.35):
         assert next_grasp(model(slope), WorkingPoint(force)).normal_force >= 0.35
         assert next_grasp(model(level), WorkingPoint(force)).normal_force == pytest.approx(force, rel=0.3)
+
+
+def test_a_grasp_that_presses_harder_than_any_before_says_so() -> None:
+    told = next_grasp(model(np.diag([1e-8, 1e-8, 0.25])), WorkingPoint(500.0))
+    assert told.normal_force > 0.2
+    assert told.beyond == (
+        f"{told.normal_force:.4g} N an element is more than any grasp had so far (0.2): "
+        "make sure that sensor and object bear it"
+    )
+    assert next_grasp(model(np.diag([1.0, 1e-8, 4.0])), WorkingPoint(0.1)).beyond is None
+
+
+def test_what_sensors_differ_by_is_not_expected_to_be_told_by_one_grasp() -> None:
+    scales = model().scales
+    assert scales is not None
+    several = model(scales=replace(scales, between_sensors=SensorScale(Scale(0.12, 4.0), {})))
+    assert scatter(several)[0] == pytest.approx(0.13)
+    assert next_grasp(several, POINT).after > next_grasp(model(), POINT).after
 
 
 def test_a_quick_grasp_is_worth_more_where_slip_tells_nothing_of_it() -> None:

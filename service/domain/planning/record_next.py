@@ -13,7 +13,9 @@ from stiction_client.support import OUTDATED, Kind
 
 @dataclass(frozen=True, slots=True)
 class RecordNext:
-    """The grasp to record; see ``estimators.next_grasp``. ``support`` and ``advice`` are of the friction known now."""
+    """The grasp to record; see ``estimators.next_grasp``. ``support`` and ``advice`` are of the friction known now,
+    ``notes`` what else is to be known of the model.
+    """
 
     material: str
     method: str
@@ -26,30 +28,38 @@ class RecordNext:
     uncertainty: float
     after: float
     conservative_friction: float
+    beyond: str | None
     support: Kind
     advice: str
+    notes: tuple[str, ...]
 
 
 def record_next(
     stored: StoredModel,
-    normal_force: float,
+    normal_force: float | None,
     tangential_velocity: float,
     quantile: float = DESIGN.quantile,
     elements: int = DESIGN.elements,
     load: float = 0.0,
     drop_probability: float = DESIGN.drop_probability,
+    sensor: str | None = None,
 ) -> RecordNext:
-    """The grasp that most narrows a material's friction where a planner asks for it; raises ``InvalidValue``."""
+    """The grasp that most narrows a material's friction where a planner asks for it; raises ``InvalidValue``.
+
+    Without a ``normal_force`` in the middle of the data; as the ``sensor`` shows it, where one is named.
+    """
     model = to_friction_model(stored.model)
+    model = model if sensor is None else model.on_sensor(sensor)
+    force = 0.5 * sum(model.domain.normal_force) if normal_force is None else normal_force
     recorded = model.diagnostics.get("clusters", 1.0) if model.diagnostics.get("cluster_kind") == "grasp" else 1.0
     try:
-        asked = estimators.WorkingPoint(normal_force, tangential_velocity, quantile, elements)
+        asked = estimators.WorkingPoint(force, tangential_velocity, quantile, elements)
         probing = estimators.Probing(load=load, drop_probability=drop_probability)
         found = estimators.next_grasp(model, asked, probing, int(float(recorded)))
     except InvalidSamples as error:
         raise InvalidValue(error.name, error.value, error.allowed) from error
     stale = OUTDATED if stored.outdated else None
-    support = model.support_at(tangential_velocity, normal_force, stale)
+    support = model.support_at(tangential_velocity, force, stale)
     return RecordNext(
         stored.material,
         stored.model.method,
@@ -57,4 +67,5 @@ def record_next(
         **asdict(found),
         support=support.kind,
         advice=support.advice,
+        notes=model.notes,
     )

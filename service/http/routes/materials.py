@@ -140,9 +140,9 @@ async def read_friction(
 def read_next_grasp(context: CurrentContext, name: str, asked: Annotated[NextGraspQuery, Query()]) -> NextGraspOut:
     """The grasp that most narrows friction at the planner's working point, per second of robot time."""
     known = context.models.read(context.database, name, asked.method)
-    force = asked.fn or 0.5 * sum(known.stored.model.normal_force)
-    at = (force, asked.v, asked.quantile, asked.elements)
-    return NextGraspOut.model_validate(asdict(record_next(known.stored, *at, asked.load, asked.drop_probability)))
+    at = (asked.fn, asked.v, asked.quantile, asked.elements)
+    found = record_next(known.stored, *at, asked.load, asked.drop_probability, asked.sensor)
+    return NextGraspOut.model_validate(asdict(found))
 
 
 @router.post(

@@ -223,6 +223,7 @@ class NextGraspQuery(BaseModel):
     method: Annotated[FitMethod, Field(description="Whose current model answers; `auto`: the recommended one")] = "auto"
     load: Annotated[float, Field(ge=0.0, le=1e6, description="N that the contact bears while it is probed")] = 0.0
     drop_probability: Annotated[float, Field(ge=1e-12, le=0.5, description="With which it may drop that load")] = 1e-3
+    sensor: GraspingSensor = None
 
 
 class NextGraspOut(BaseModel):
@@ -243,8 +244,10 @@ class NextGraspOut(BaseModel):
                     "uncertainty": 0.061,
                     "after": 0.043,
                     "conservative_friction": 0.31,
+                    "beyond": None,
                     "support": "not identified",
                     "advice": "the expected friction is known to within ± 15% only: record more grasps",
+                    "notes": [],
                 }
             ]
         }
@@ -261,8 +264,10 @@ class NextGraspOut(BaseModel):
     uncertainty: Annotated[float, Field(description="Half-width of the 95 % interval of the expected friction now")]
     after: Annotated[float, Field(description="The same as it is expected after the grasp")]
     conservative_friction: Annotated[float, Field(description="The quantile at the working point now")]
+    beyond: Annotated[str | None, Field(description="That it presses harder than any grasp so far; null where not")]
     support: SupportKind
     advice: Advice
+    notes: Notes
 
 
 class FrictionOut(BaseModel):

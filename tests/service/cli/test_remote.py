@@ -33,7 +33,13 @@ from stiction_client.stream import SlipStream
 from tests.service.report.test_material import JOB, LOG, MODEL, SEEN
 
 TOLD = NextGrasp(
-    "paper", "ols", 3, 0.05, 5e-4, 4e-3, 0.9, 4.5, 0.06, 0.04, 0.31, "not identified", "record more grasps"
+    "paper",
+    "ols",
+    *(3, 0.05, 5e-4, 4e-3, 0.9, 4.5, 0.06, 0.04, 0.31),
+    "not identified",
+    "record more grasps",
+    "0.05 N is more",
+    ("one sensor",),
 )
 Say = Callable[..., str]
 
@@ -66,16 +72,18 @@ def test_the_grasp_to_record_next_is_told_in_words_with_its_units(client: Mock, 
         "takes 4.50 s",
         "known to ± 0.0600 now, ± 0.0400 after that",
         "support not identified: record more grasps",
+        "mind 0.05 N is more",
+        "note one sensor",
     ):
         assert words in lines
-    assert json.loads(say("next", "paper", "--json")) == asdict(TOLD)
+    assert json.loads(say("next", "paper", "--json")) == {**asdict(TOLD), "notes": ["one sensor"]}
 
 
 def test_what_is_not_given_is_asked_for_as_a_planner_does(client: Mock, say: Say) -> None:
     client.next_grasp.return_value = TOLD
     say("next", "paper")
     client.next_grasp.assert_called_once_with(
-        "paper", None, 0.0, 1e-2, 60, method="auto", load=0.0, drop_probability=1e-3
+        "paper", None, 0.0, 1e-2, 60, method="auto", load=0.0, drop_probability=1e-3, sensor=None
     )
 
 

@@ -15,6 +15,7 @@ def test_what_to_record_next_is_told_in_newtons_and_millimetres() -> None:
         "Record next: press with 0.0800 N on an element and let it slip by 0.500 mm at 4.00 mm/s. The expected "
         "friction, known to ± 0.0300, is then known to ± 0.0200."
     )
+    assert record_next(replace(PROBE, beyond="0.08 N is more")).endswith("known to ± 0.0200. Mind: 0.08 N is more.")
 
 
 def test_friction_is_told_at_rest_in_the_middle_of_the_forces_observed() -> None:

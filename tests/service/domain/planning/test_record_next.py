@@ -50,6 +50,15 @@ def test_a_model_that_is_outdated_supports_less(new_model: NewModel) -> None:
     assert (told.support, told.advice != record_next(model, 0.05, 0.0).advice) == ("stale", True)
 
 
+def test_notes_of_the_model_and_the_sensor_that_grasps_are_told_beside_the_grasp(new_model: NewModel) -> None:
+    known = replace(new_model, diagnostics={"sensor": "left", "weakening": "a log lowers it"})
+    model = StoredModel(1, "paper", 3, True, False, datetime.now(UTC), known)
+    assert record_next(model, 0.05, 0.0, sensor="left").notes == ("a log lowers it",)
+    assert "none by 'right'" in record_next(model, 0.05, 0.0, sensor="right").notes[1]
+    middle = 0.5 * sum(known.normal_force)
+    assert record_next(model, None, 0.0) == record_next(model, middle, 0.0)
+
+
 @pytest.mark.parametrize("name", ["quantile", "elements", "load"])
 def test_what_cannot_be_asked_is_told_by_its_name(new_model: NewModel, name: str) -> None:
     model = StoredModel(1, "paper", 3, True, False, datetime.now(UTC), new_model)
