@@ -1,7 +1,7 @@
 """Models of several materials, or several versions, in one picture."""
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -13,11 +13,9 @@ from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute
 from service.http.problems import INVALID_REQUEST, Problem
 from service.web.comparison import MOST_COMPARED, common_force, compare, picture
-from service.web.forms import typed
 from service.web.friction import usual_model
 from service.web.materials import names
-from service.web.rendering import render
-from service.web.routes.materials import ForceOrEmpty
+from service.web.working_point import PageQuery, shown_at
 
 router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
@@ -26,26 +24,26 @@ Ids = Annotated[list[Annotated[int, Query(ge=1, le=2**53)]], Query(default_facto
 
 
 @router.get("/compare", dependencies=[READ])
-def compare_models(
-    context: CurrentContext, request: Request, material: Names, model: Ids, fn: ForceOrEmpty = None
-) -> Response:
-    """The usual models of the materials named, and the versions chosen; raises ``NotFound``, ``Problem``."""
+def compare_models(context: CurrentContext, request: Request, material: Names, model: Ids) -> Response:
+    """The usual models of the materials named, and the versions chosen, at normal force ``fn``.
+
+    Raises ``NotFound``, ``Problem``.
+    """
     wanted = list(dict.fromkeys(name for name in material if name))
     without, found = _models(context, wanted, model)
     if len(found) > MOST_COMPARED:
         raise Problem.wrong_value(INVALID_REQUEST, "models", len(found), f"{MOST_COMPARED} in one picture")
-    force = None if not found else common_force(found) if fn is None else fn
-    return render(
-        request,
-        "compare.html",
-        compared=[] if force is None else compare(found, force),
-        chart=None if force is None else picture(found, force),
-        force=force,
-        without=without,
-        asked={"materials": wanted, "models": model, "fn": typed(fn)},
-        names=names(context),
-        most=MOST_COMPARED,
-    )
+
+    def show(at: PageQuery) -> dict[str, Any]:
+        force = None if not found else common_force(found) if at.fn is None else at.fn
+        return {
+            "compared": [] if force is None else compare(found, force),
+            "chart": None if force is None else picture(found, force),
+            "force": force,
+            "asked": {"materials": wanted, "models": model, "fn": at.typed()["fn"]},
+        }
+
+    return shown_at(request, "compare.html", show, without=without, names=names(context), most=MOST_COMPARED)
 
 
 def _models(context: Context, wanted: Sequence[str], ids: Sequence[int]) -> tuple[list[str], list[StoredModel]]:

@@ -1,8 +1,9 @@
 """Materials: all of them, and one."""
 
+from collections.abc import Sequence
 from functools import partial
 from hashlib import sha256
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,7 +11,7 @@ from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
 from db.paging import Window
-from db.records import LogFilter, SampledLog, StoredModel
+from db.records import LogFilter, Material, SampledLog, StoredModel
 from db.repositories import detections, friction_models, grasp_logs, materials
 from estimators.method_names import ModelMethod
 from service.domain.errors import NoModel
@@ -21,28 +22,26 @@ from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
 from service.http.long_answers import LONG_ANSWER
 from service.http.paging import Page
-from service.http.schemas.common import CursorText, Force, Velocity
+from service.http.schemas.common import CursorText
 from service.http.schemas.grasp_logs import GraspLogOut
 from service.http.schemas.materials import MaterialOut, NewMaterial
 from service.report.wording import NEWEST_LOGS
 from service.web import reports
 from service.web.derived import derive
-from service.web.forms import EMPTY_IS_NONE, FormRoute, checked, typed
+from service.web.forms import FormRoute, checked
 from service.web.friction import coefficients, friction_at, listed, next_of, sections, usual_model
 from service.web.grasp_effects import MOST_GRASPS, differing, draw_effects
 from service.web.posterior import densities, pairs
 from service.web.rendering import render
 from service.web.samples import SampleFile, write_samples
-from stiction_client.records import GraspLogReceipt, Material
+from service.web.working_point import PageQuery, shown_at
+from stiction_client import records
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
 
 ON_A_PAGE = 50
 LOGS_ON_A_PAGE = 25
 NEWEST_VERSIONS = Window("id", descending=True, limit=20)
-
-ForceOrEmpty = Annotated[Force | None, EMPTY_IS_NONE, Query()]
-VelocityOrEmpty = Annotated[Velocity | None, EMPTY_IS_NONE, Query()]
 
 
 @router.get("/", dependencies=[READ])
@@ -51,18 +50,20 @@ def list_materials(
     request: Request,
     search: Annotated[str, Query(max_length=100)] = "",
     sort: Literal["name", "-name", "created_at", "-created_at"] = "name",
-    fn: ForceOrEmpty = None,
     cursor: CursorText = None,
 ) -> Response:
-    """Friction at a working point of all whose name has the search in it; a greeting where there is no material yet."""
+    """Friction at normal force ``fn`` of all whose name has the search in it; a greeting where there is no material."""
     page = Page(sort, ON_A_PAGE, cursor)
     with context.database.read() as session:
         found, after = page.cut(materials.list_all(session, page.window(), search or None))
     if not found and not search and cursor is None:
         return render(request, "welcome.html")
-    rows = [listed(each, fn) for each in found]
-    asked = {"search": search, "sort": sort, "fn": typed(fn)}
-    return render(request, "materials.html", rows=rows, asked=asked, after=after, is_first=cursor is None)
+
+    def show(at: PageQuery) -> dict[str, Any]:
+        asked = {"search": search, "sort": sort, "fn": at.typed()["fn"]}
+        return {"rows": [listed(each, at.fn) for each in found], "asked": asked}
+
+    return shown_at(request, "materials.html", show, after=after, is_first=cursor is None)
 
 
 @router.post("/materials", dependencies=[UPLOAD])
@@ -80,44 +81,41 @@ def create_material(
 
 
 @router.get("/materials/{name}", dependencies=[READ])
-def show_material(
-    context: CurrentContext,
-    request: Request,
-    name: str,
-    fn: ForceOrEmpty = None,
-    v: VelocityOrEmpty = None,
-    method: ModelMethod | None = None,
-    cursor: CursorText = None,
-) -> Response:
-    """Its model at a working point, the versions before it, and its logs; raises ``NotFound``."""
+def show_material(context: CurrentContext, request: Request, name: str, cursor: CursorText = None) -> Response:
+    """Its model at a working point (``fn``, ``v``, ``method``), the versions before it, and its logs.
+
+    Raises ``NotFound``.
+    """
     page = Page("-created_at", LOGS_ON_A_PAGE, cursor, identity="hex")
     with context.database.read() as session:
         found = materials.get(session, name)
-        versions = friction_models.versions(session, found.id, method, window=NEWEST_VERSIONS)
         logs, after = page.cut(grasp_logs.list_all(session, page.window(), LogFilter(material_id=found.id)))
         sampled = detections.newest_sampled_logs(session, found.id, MOST_GRASPS)[::-1]
-    stored = usual_model(found.models, method)
-    shown = None if stored is None else friction_at(stored, fn, v or 0.0, found.models)
+    show = partial(_model_at, context, found, sampled)
+    given = {"material": found, "has_samples": bool(sampled), "logs": logs, "after": after}
+    return shown_at(request, "material.html", show, **given)
+
+
+def _model_at(context: Context, found: Material, sampled: Sequence[SampledLog], at: PageQuery) -> dict[str, Any]:
+    """What the page shows of its model, and of the versions before it."""
+    with context.database.read() as session:
+        versions = friction_models.versions(session, found.id, at.method, window=NEWEST_VERSIONS)
+    stored = usual_model(found.models, at.method)
+    shown = None if stored is None else friction_at(stored, at.fn, at.v or 0.0, found.models)
     effects = [] if stored is None else differing(stored, sampled)
-    return render(
-        request,
-        "material.html",
-        material=found,
-        stored=stored,
-        friction=shown,
-        coefficients=[] if stored is None else coefficients(stored),
-        next_grasp=None if stored is None or shown is None else next_of(stored, shown),
-        charts=[] if stored is None or shown is None else sections(stored, shown),
-        has_samples=bool(sampled),
-        effects=effects,
-        effect_chart=draw_effects(effects) if effects else None,
-        densities=[] if stored is None else densities(stored),
-        pairs=[] if stored is None else pairs(stored),
-        asked={"fn": typed(fn), "v": typed(v), "method": method},
-        versions=versions,
-        logs=logs,
-        after=after,
-    )
+    return {
+        "stored": stored,
+        "friction": shown,
+        "coefficients": [] if stored is None else coefficients(stored),
+        "next_grasp": None if stored is None or shown is None else next_of(stored, shown),
+        "charts": [] if stored is None or shown is None else sections(stored, shown),
+        "effects": effects,
+        "effect_chart": draw_effects(effects) if effects else None,
+        "densities": [] if stored is None else densities(stored),
+        "pairs": [] if stored is None else pairs(stored),
+        "asked": at.typed(),
+        "versions": versions,
+    }
 
 
 @router.get("/materials/{name}/samples", dependencies=[READ, LONG_ANSWER])
@@ -167,6 +165,6 @@ def _report_of(context: Context, name: str) -> partial[None]:
         logs = grasp_logs.list_all(session, newest, LogFilter(material_id=found.id))
     stored = usual_model(found.models)
     probe = None if stored is None else next_of(stored, friction_at(stored, None))
-    receipts = [GraspLogReceipt.from_json(GraspLogOut.of(log).model_dump(mode="json")) for log in logs]
-    material = Material.from_json(MaterialOut.of(found).model_dump(mode="json"))
+    receipts = [records.GraspLogReceipt.from_json(GraspLogOut.of(log).model_dump(mode="json")) for log in logs]
+    material = records.Material.from_json(MaterialOut.of(found).model_dump(mode="json"))
     return partial(reports.write_material, material, receipts, probe)

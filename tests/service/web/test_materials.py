@@ -54,6 +54,26 @@ def test_a_material_shows_friction_where_it_has_a_model_and_says_where_it_has_no
 
 
 @pytest.mark.usefixtures("store")
+@pytest.mark.parametrize(
+    ("path", "told", "kept"),
+    [
+        ("/materials/paper?fn=0,1&v=0.001", "“Normal force on an element, N” is 0,1", ['value="0,1"', 'value="0.001"']),
+        ("/materials/paper?fn=0.1&v=-1", "“Tangential velocity, m/s” is -1", ['value="0.1"', 'value="-1"']),
+        ("/materials/paper?fn=0.1&method=lasso", "“Method” is lasso", ['value="0.1"', "<option selected>ols"]),
+        ("/?fn=abc&search=pap", "“Normal force on an element, N” is abc", ['value="abc"', 'value="pap"']),
+        ("/compare?material=paper&fn=abc", "“Normal force on an element, N” is abc", ['value="abc"', 'value="paper"']),
+    ],
+)
+def test_a_wrong_working_point_is_told_above_the_page_and_stays_in_its_form(
+    browser: Any, path: str, told: str, kept: list[str]
+) -> None:
+    answer = browser.get(path)
+    assert answer.status_code == 422
+    for words in (told, "paper", *kept):
+        assert words in answer.text
+
+
+@pytest.mark.usefixtures("store")
 def test_a_material_shows_why_its_method_was_taken(browser: Any, database: Database, new_model: NewModel) -> None:
     because = "without the 48 beyond 3 deviations"
     with database.write() as session:
