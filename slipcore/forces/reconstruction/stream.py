@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
-from slipcore.forces.defaults import FORCE_STREAM
+from slipcore.forces.defaults import FORCE_STREAM, STRENGTH
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.uneven import UnevenLayer
@@ -26,8 +26,9 @@ from slipcore.saturation import RangeWatch
 class StreamedForces:
     """The ``forces`` of a frame, and the ``age`` s of the frame by which its contact was last sought.
 
-    Forces are zero where nothing touches, and where they are not known yet, because they ``wait_for`` what that says:
-    "noise", "set-up" or "contact". ``given``: whether they are by the gripper's force, too, and ``contradiction`` by
+    Those of elements are zero where nothing touches, and where they are not known yet, because they ``wait_for`` what
+    that says: "noise", "set-up" or "contact"; the resultant is then the gripper's force, or zero give or take what the
+    gel bears. ``given``: whether they are by the gripper's force, too, and ``contradiction`` by
     how many standard deviations this differs from what is found; NaN without one, and while markers have moved on from
     where the contact was last sought. ``saturated``: how many elements show displacement at the end of the sensor's
     range, by the frames until then; it counts as not seen. ``force_deviation`` N: how unsure forces are for a detector,
@@ -133,18 +134,18 @@ class ForceStream:
         if self._tracking is None:
             self._begin_to(self._set_up)
         if self._noise is None:
-            return self._none("noise")
+            return self._unknown("noise", known)
         frame = self._marker_frame(time, moved_by, seen, known)
         if self._tracking is not None:
             self._seek(self._tracking, frame)
         if self._tracking is None or not self._tracking.is_ready:
             self.touched_early |= self._touched
-            return self._none("set-up")
+            return self._unknown("set-up", known)
         if not self._touched:
             return self._untouched(self._tracking.sensor, frame)
         reader = self._tracking.reader
         if reader is None:
-            return self._none("contact")
+            return self._unknown("contact", known)
         n, m = self._position.shape[:2]
         forces = reader.read(frame.data, (n, m))
         return StreamedForces(forces, time - self._tracking.time, None, reader.given, self._compare(frame, forces))
@@ -259,11 +260,15 @@ class ForceStream:
             self._tracking = found if self._touched and touch == self._touches else found.untouched()
 
     def _untouched(self, sensor: SensorResponse, frame: MarkerReading) -> StreamedForces:
-        n, m = self._position.shape[:2]
-        limit, moment = sensor.unnoticed(frame.noise), sensor.unnoticed_moment(frame.noise)
-        forces = FrameForces.unnoticed((n, m), limit, moment, frame.known)
-        return StreamedForces(forces, given=bool(frame.known.given.any()))
+        return self._unseen(sensor.unnoticed(frame.noise), sensor.unnoticed_moment(frame.noise), frame.known)
 
-    def _none(self, wait_for: str) -> StreamedForces:
+    def _unknown(self, wait_for: str, known: KnownForce) -> StreamedForces:
+        """Forces that may be all that the gel bears."""
+        most = STRENGTH.largest * self._gel.young_modulus * self._area * self._position[..., 0].size
+        arm = float(np.hypot(*np.abs(self._position[..., :2]).max(axis=(0, 1))))
+        return replace(self._unseen(np.full(3, most), most * arm, known), wait_for=wait_for)
+
+    def _unseen(self, limit: FloatArray, moment: float, known: KnownForce) -> StreamedForces:
+        """No forces of elements, a resultant that is ``known``, or one up to a ``limit`` [3] N and ``moment`` N m."""
         n, m = self._position.shape[:2]
-        return StreamedForces(FrameForces.none((n, m)), wait_for=wait_for)
+        return StreamedForces(FrameForces.unnoticed((n, m), limit, moment, known), given=bool(known.given.any()))

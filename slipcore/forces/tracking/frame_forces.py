@@ -60,12 +60,6 @@ class FrameForces(TypicalDeviations):
     contact: BoolArray
 
     @classmethod
-    def none(cls, grid: tuple[int, int]) -> "FrameForces":
-        """Of a frame of which nothing is known yet."""
-        force, total = np.zeros((*grid, 3)), np.zeros(3)
-        return cls(force, force, force[..., 2], force, total, total, 0.0, 0.0, np.zeros(grid, dtype=bool))
-
-    @classmethod
     def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, moment: float, known: KnownForce) -> "FrameForces":
         """Of a frame whose markers do not move beyond noise: none, up to the ``limit`` [3] N and ``moment`` N m that
         they would not show, unless the resultant is ``known``. Where on the elements it acts is not.

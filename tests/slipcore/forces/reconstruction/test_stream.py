@@ -120,6 +120,22 @@ def test_the_first_frames_tell_the_noise_where_it_is_not_given(pressed: Pressed)
     assert first.forces.resultant[2] == pytest.approx(total(log, 0)[2], rel=0.01)
 
 
+def test_while_forces_are_waited_for_only_the_grippers_bounds_them(pressed: Pressed) -> None:
+    """Else they may be all that the gel bears: its modulus on all elements."""
+    log = pressed(LIGHT, crop=INSIDE)
+    stream = made(log)
+    unknown = stream.step(0.0, log.displacement[0])
+    bears = GEL.young_modulus * log.element_area * np.prod(log.grid)
+    assert (unknown.wait_for, unknown.given, unknown.force_deviation) == ("noise", False, 0.0)
+    np.testing.assert_allclose(unknown.forces.resultant_deviation, bears)
+    assert unknown.forces.moment_deviation == pytest.approx(bears * np.hypot(*log.position[-1, -1, :2]))
+    known = stream.step(0.1, log.displacement[0], None, 8.0, 0.1)
+    assert (known.wait_for, known.given) == ("noise", True)
+    np.testing.assert_allclose(known.forces.resultant, [0.0, 0.0, -8.0], rtol=1e-3)
+    np.testing.assert_allclose(known.forces.resultant_deviation, [bears, bears, 0.1], rtol=1e-3)
+    assert not known.forces.force.any()
+
+
 def test_frames_do_not_wait_for_looks_beside_them(pressed: Pressed) -> None:
     log, beside = pressed(LIGHT, noise=NOISE, crop=INSIDE), Later()
     stream = made(log, noise=NOISE, executor=beside)
