@@ -18,6 +18,9 @@ class GelLimits:
     """Pa; softer than any gel, stiffer than any solid."""
     thickness: float = 1e-6
     """m, at least."""
+    thinness: float = 0.1
+    """Thickness over the distance between markers, at least: thinner gels move a marker only where it is loaded itself,
+    and their response takes time with the square of one over it."""
     relative_thickness: tuple[float, float] = (0.25, 4.0)
     """Of a place, over the gel's thickness."""
     slope: float = 0.35

@@ -115,7 +115,7 @@ class TractionFit(TractionMean):
         """Share [3] of what is known of the resultant along each axis that comes from the data, not the prior."""
         whole = np.ones((1, self.prior_root.shape[1]))
         before = np.linalg.norm(whole @ self.prior_root, axis=(-2, -1))
-        return np.asarray(1.0 - (self.deviation(whole)[:, 0] / before) ** 2)
+        return np.asarray(np.maximum(1.0 - (self.deviation(whole)[:, 0] / before) ** 2, 0.0))
 
     def kernel_width(self, observation: ObservationModel, pitch: float) -> float:
         """Side (m) of the square over which tractions are in effect averaged: the median over nodes, of the worse of

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
+from numbers import Real
 from typing import Any
 
 from slipcore.errors import InvalidInput
@@ -11,8 +12,8 @@ from slipcore.forces.defaults import GEL
 
 @dataclass(frozen=True, slots=True)
 class Gel:
-    """Gel of ``young_modulus`` Pa and ``poisson_ratio``, bonded to a rigid base ``thickness`` m below its surface (inf:
-    a half-space), with markers ``marker_depth`` m below the surface. Raises ``InvalidInput``.
+    """Gel of ``young_modulus`` Pa and ``poisson_ratio``, bonded to a rigid base ``thickness`` m below its surface (inf
+    or None: a half-space), with markers ``marker_depth`` m below the surface. Raises ``InvalidInput``.
 
     ``relative_thickness``: of a gel that is not alike thick everywhere, at each marker [n, m], over ``thickness``.
     """
@@ -24,6 +25,8 @@ class Gel:
     relative_thickness: tuple[tuple[float, ...], ...] | None = None
 
     def __post_init__(self) -> None:
+        for each in fields(self):
+            object.__setattr__(self, each.name, _read(each.name, getattr(self, each.name)))
         softest, stiffest = GEL.young_modulus
         inside = softest <= self.young_modulus <= stiffest
         _check("young_modulus", self.young_modulus, inside, f"{softest:g} to {stiffest:g} Pa")
@@ -44,8 +47,20 @@ class Gel:
             raise InvalidInput(name, f"{len(rows)} rows", "as many numbers in each, one a marker, 2 × 2 or more")
         for value in (each for row in rows for each in row):
             _check(name, value, least <= value <= most, f"{least:g} to {most:g}")
-        thinnest = self.thickness * min(map(min, rows))
-        _check("marker_depth", self.marker_depth, self.marker_depth < thinnest, f"less than {thinnest:g} m, the least")
+        inside = self.marker_depth < self.thinnest
+        _check("marker_depth", self.marker_depth, inside, f"less than {self.thinnest:g} m, the least")
+
+    @property
+    def thinnest(self) -> float:
+        """Its least thickness, m."""
+        rows = self.relative_thickness
+        return self.thickness if rows is None else self.thickness * min(map(min, rows))
+
+    def check_beside(self, pitch: float) -> None:
+        """Raises ``InvalidInput`` for a gel that is too thin for markers ``pitch`` m apart."""
+        least = GEL.thinness * pitch
+        allowed = f"{least:.3g} m or more, {GEL.thinness:g} of the distance between markers (is it in m?)"
+        _check("thickness", self.thinnest, self.thinnest >= least, allowed)
 
     @classmethod
     def from_json(cls, properties: Mapping[str, Any]) -> "Gel":
@@ -53,16 +68,15 @@ class Gel:
         for what is no number, another name or a missing modulus or ratio.
         """
         names = [each.name for each in fields(cls)]
-        try:
-            read = {name: _read(name, value) for name, value in properties.items()}
-        except (AttributeError, TypeError) as error:
-            raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
         needed = [each.name for each in fields(cls) if each.default is MISSING]
-        wrong = [f"with the unknown {name!r}"[:120] for name in read if name not in names]
-        wrong += [f"without {name}" for name in needed if name not in read]
+        allowed = f"numbers named {', '.join(names)}"
+        if not isinstance(properties, Mapping):
+            raise InvalidInput("gel", repr(properties)[:120], allowed)
+        wrong = [f"with the unknown {name!r}"[:120] for name in properties if name not in names]
+        wrong += [f"without {name}" for name in needed if name not in properties]
         if wrong:
-            raise InvalidInput("gel", wrong[0], f"numbers named {', '.join(names)}")
-        return cls(**read)
+            raise InvalidInput("gel", wrong[0], allowed)
+        return cls(**properties)
 
     def to_json(self) -> dict[str, float | None]:
         """As ``from_json`` reads it."""
@@ -72,13 +86,16 @@ class Gel:
 def _read(name: str, given: Any) -> Any:
     if name != "relative_thickness":
         return _number(name, given)
-    return None if given is None else tuple(tuple(_number(name, value) for value in row) for row in given)
+    try:
+        return None if given is None else tuple(tuple(_number(name, value) for value in row) for row in given)
+    except TypeError as error:
+        raise InvalidInput(name, repr(given)[:60], "rows of one number a marker") from error
 
 
 def _number(name: str, given: object) -> float:
     if given is None and name == "thickness":
         return math.inf
-    if isinstance(given, bool) or not isinstance(given, int | float):
+    if isinstance(given, bool) or not isinstance(given, Real):
         raise InvalidInput(name, repr(given)[:60], "a number")
     return float(given)
 

@@ -43,8 +43,9 @@ def response_matrices(
     uneven: UnevenLayer | None = None,
 ) -> list[FloatArray]:
     """``response_matrix`` of several sets of ``nodes`` [k, 2] m, whose hat functions have the half-width ``pitch`` m,
-    and of displacement along some ``axes`` alone.
+    and of displacement along some ``axes`` alone. Raises ``InvalidInput`` for a gel that is too thin beside these.
     """
+    gel.check_beside(pitch)
     if uneven is None:
         return _of_a_layer(gel, pitch, nodes, position, axes)
     whole = uneven.responses(gel, nodes, lambda alike: _of_a_layer(alike, pitch, nodes, position, (0, 1, 2)))

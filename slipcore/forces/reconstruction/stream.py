@@ -73,7 +73,8 @@ class ForceStream:
             raise InvalidInput("element_area", element_area, "above 0 m², finite")
         if noise is not None:
             check_noise(noise)
-        UnevenLayer.of(gel, place)  # so that a map of another lattice is refused here, and not by a look
+        gel.check_beside(float(np.sqrt(element_area)))  # so that what does not fit is refused here, and not by a look
+        UnevenLayer.of(gel, place)
         self.nodes = len(Nodes.around(place[..., :2].reshape(-1, 2), element_area))
         """On which traction is sought: a look takes time with their cube, and memory with their square."""
         self.held_bytes = bytes_needed(place, element_area)

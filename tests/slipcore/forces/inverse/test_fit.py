@@ -90,6 +90,13 @@ def test_the_most_probable_prior_is_found_from_another(nodes: Nodes, support: Bo
         assert log_evidence(observation, data, nodes, support, shape)[0] <= found + 0.03
 
 
+def test_no_share_is_from_data_that_were_not_seen_and_none_is_below_zero(nodes: Nodes, support: BoolArray) -> None:
+    observation, _ = drawn(nodes, support, 0.1, usual())
+    unseen = replace(observation, noise=np.full(400, np.inf))
+    share = fit(unseen, nodes, support, TractionPrior(usual(), 0.1)).information()
+    np.testing.assert_array_equal(share, np.zeros(3))
+
+
 @pytest.mark.parametrize("seen", [400, 40])
 def test_a_mean_alone_is_that_of_the_whole_fit(nodes: Nodes, support: BoolArray, seen: int) -> None:
     """Of more data than tractions, and of fewer."""

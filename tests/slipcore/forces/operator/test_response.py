@@ -1,5 +1,6 @@
 """Displacement of markers by traction on nodes."""
 
+import json
 from typing import Any
 
 import numpy as np
@@ -94,11 +95,34 @@ def test_markers_between_nodes_are_met_as_well_as_on_them() -> None:
         ("thickness", 0.0),
         ("marker_depth", 2e-3),
         ("thickness", np.nan),
+        ("thickness", "2 mm"),
+        ("young_modulus", None),
+        ("poisson_ratio", np.ones(2)),
+        ("relative_thickness", (1.0, 1.0)),
+        ("relative_thickness", ((1.0, None), (1.0, 1.0))),
     ],
 )
-def test_an_impossible_gel_is_refused_by_name(entry: str, value: float) -> None:
-    with pytest.raises(InvalidInput, match=entry):
+def test_an_impossible_gel_is_refused_by_name(entry: str, value: Any) -> None:
+    with pytest.raises(InvalidInput, match=f"{entry} is"):
         Gel(**{"young_modulus": 1e6, "poisson_ratio": 0.49, "thickness": 2e-3} | {entry: value})
+
+
+def test_a_gel_is_the_same_of_arrays_and_of_numbers_of_any_kind() -> None:
+    gel = Gel(10**6, np.float32(0.5), None, marker_depth=0)  # type: ignore[arg-type]
+    assert gel == Gel(1e6, 0.5)
+    uneven = Gel(1e6, 0.5, 2e-3, relative_thickness=np.array([[1.0, 0.5], [1.0, 2.0]]))  # type: ignore[arg-type]
+    assert uneven.relative_thickness == ((1.0, 0.5), (1.0, 2.0))
+    assert uneven.thinnest == 1e-3
+    assert Gel.from_json(json.loads(json.dumps(uneven.to_json()))) == uneven
+
+
+def test_a_gel_much_thinner_than_its_markers_are_apart_is_refused_before_it_takes_hours() -> None:
+    """Its response takes time with the square of how thin it is; most likely its thickness is not in m."""
+    nodes = Nodes.around(np.zeros((1, 2)), 1e-6)
+    response_matrix(Gel(1e6, 0.49, 1.001e-4), nodes, np.zeros((1, 2)))
+    for gel in (Gel(1e6, 0.49, 2e-6), Gel(1e6, 0.49, 2e-4, relative_thickness=((1.0, 0.4), (1.0, 1.0)))):
+        with pytest.raises(InvalidInput, match=r"thickness is .*e-0[56]; allowed: 0.0001 m or more, 0.1 of the dist"):
+            response_matrix(gel, nodes, np.zeros((1, 2)))
 
 
 @pytest.mark.parametrize("away", [(0.0, 0.0), (0.3, -2.0)])

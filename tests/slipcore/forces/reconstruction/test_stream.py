@@ -275,6 +275,7 @@ def test_what_does_not_fit_is_refused_by_name_and_changes_nothing(pressed: Press
         ({"element_area": -1.0}, "element_area is -1"),
         ({"element_area": 1e-12}, "an area that needs at most"),
         ({"noise": -1.0}, "noise is -1"),
+        ({"gel": replace(GEL, thickness=5e-6)}, "thickness is 5e-06"),
     ):
         given = {"position": log.position, "element_area": log.element_area, "gel": GEL} | wrong
         with pytest.raises(InvalidInput, match=said):
