@@ -1,6 +1,6 @@
 """A sensor's faults from pure presses."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from slipcore.calibration.kernel import kernel_width, squared_width
 from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
 from slipcore.calibration.press import InvalidPress, PressLog, find_press, known_forces, press_fault
-from slipcore.calibration.zero import drifts, offsets
+from slipcore.calibration.zero import Zero, drifts, offsets
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.frames import FloatArray, GraspLog
 
@@ -53,8 +53,8 @@ def _check_alike(logs: Sequence[GraspLog]) -> None:
 
 def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:
     tables = {
-        "force_offset": ("N", AXES, [offsets(press.zero) for press in presses]),
-        "force_drift": ("N/s", AXES, [drifts(press.zero) for press in presses]),
+        "force_offset": ("N", AXES, [_of_zero(offsets, press) for press in presses]),
+        "force_drift": ("N/s", AXES, [_of_zero(drifts, press) for press in presses]),
         "crosstalk": ("-", AXES[:2], [crosstalk(press) for press in presses]),
     }
     vectors = [
@@ -70,6 +70,10 @@ def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> 
         *marker_noise(presses),
         joined("gain", "-", gains),
     ]
+
+
+def _of_zero(quantity: Callable[[Zero | None], list[PressResult]], press: PressLog) -> list[PressResult]:
+    return quantity(press.zero) if press.split is not None else ["the log has no forces"] * len(AXES)
 
 
 def _offset(presses: list[PressLog]) -> FloatArray | None:

@@ -5,6 +5,7 @@ import numpy as np
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
 from slipcore.calibration.press import PressLog, load_terms, marker_motion
+from slipcore.calibration.zero import NO_ZERO, elapsed
 from slipcore.frames import FloatArray, unit
 
 
@@ -18,10 +19,14 @@ def crosstalk(press: PressLog) -> list[PressResult]:
         return ["the log has no forces"] * 2
     if press.depth == 0.0:
         return ["no marker is pressed in, against which its motion sideways would show a load that leans"] * 2
+    if press.zero is None:
+        return [NO_ZERO] * 2
     shares, errors = _proportional(press)
     leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
     errors = np.hypot(errors, leaning)
-    return [PressEstimate(float(share), float(error)) for share, error in zip(shares, errors, strict=True)]
+    when, pressed = float(elapsed(press.log)[press.pressed].mean()), float(press.normal_force[press.pressed].mean())
+    strayed = np.count_nonzero(press.footprint) * press.zero.strayed(when)[:2] / pressed
+    return [PressEstimate(*map(float, each)) for each in zip(shares, errors, strayed, strict=True)]
 
 
 def _proportional(press: PressLog) -> tuple[FloatArray, FloatArray]:
@@ -42,6 +47,8 @@ def inward_share(press: PressLog) -> PressResult:
     """
     if press.split is None:
         return "the log has no forces"
+    if press.zero is None:
+        return NO_ZERO
     force = press.split[press.pressed][:, press.footprint]
     place, normal = press.log.position[press.footprint][:, :2], np.maximum(force[..., 2:], 0.0)
     arm = (normal * place).sum(axis=1, keepdims=True) / normal.sum(axis=1, keepdims=True) - place
@@ -52,7 +59,6 @@ def inward_share(press: PressLog) -> PressResult:
 
 def _zero_error(press: PressLog) -> float:
     """Standard error of a component's sum over the footprint that single elements' zeros make, N."""
-    if press.split is None or not press.free.any():
-        return 0.0
+    assert press.split is not None
     still = press.split[press.free][:, press.footprint, :2]
     return float(still.std() * np.sqrt(np.count_nonzero(press.footprint) / len(still)))

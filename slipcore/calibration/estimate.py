@@ -37,10 +37,13 @@ class Estimate:
 
 
 class PressEstimate(NamedTuple):
-    """What one press says of a quantity: its value and standard error."""
+    """What one press says of a quantity: its value and standard error, and what of it more presses do not average out
+    (``shared``), for it is the sensor's.
+    """
 
     value: float
     error: float
+    shared: float = 0.0
 
 
 PressResult = PressEstimate | str
@@ -60,8 +63,14 @@ def joined(name: str, unit: str, found: Sequence[PressResult]) -> Estimate:
     known = [each for each in found if isinstance(each, PressEstimate)]
     if not known:
         return unknown(name, unit, next(each for each in found if isinstance(each, str)))
-    value, error, freedom = _random_effects(np.array(known))
-    half = float(stdtrit(freedom, 0.5 + 0.5 * ESTIMATE.confidence)) * error
+    value, error, freedom = _random_effects(np.array([each[:2] for each in known]))
+    shared = float(np.mean([each.shared for each in known]))
+    half = math.hypot(
+        *(
+            float(stdtrit(k, 0.5 + 0.5 * ESTIMATE.confidence)) * each
+            for k, each in ((freedom, error), (math.inf, shared))
+        )
+    )
     return Estimate(name, unit, value, value - half, value + half)
 
 

@@ -39,7 +39,7 @@ def known_forces(logs: Sequence[GraspLog], known_force: Sequence[float | None] |
     for number, log in enumerate(logs):
         same = next((k for k in range(number) if _is_same(log, logs[k])), None)
         if same is not None:
-            raise InvalidInput("logs", f"number {number}, the same press as {same}", "each press once")
+            raise InvalidInput("logs", f"number {number + 1}, the same press as number {same + 1}", "each press once")
     known: list[float | None] = [None] * len(logs) if known_force is None else list(known_force)
     if len(known) != len(logs):
         raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")

@@ -8,13 +8,17 @@ from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 
+NO_ZERO = "no frames without contact, which show its zero: begin before the touch"
+"""Why forces of a log say nothing of quantities that an offset would look like."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Zero:
     """``offset`` [n, m, 3] N of each element in the first frame, and the ``drift`` [3] N/s that all have in common.
 
     ``offset_error``, ``drift_error`` [3]: standard errors of what the elements have in common; ``frames``: how many
-    were free; ``around``: whether some were so before the press and some after it, between which drift is known.
+    were free, at ``middle`` s in the mean; ``around``: whether some were so before the press and some after it, between
+    which drift is known.
     """
 
     offset: FloatArray
@@ -22,6 +26,7 @@ class Zero:
     offset_error: FloatArray
     drift_error: FloatArray
     frames: int
+    middle: float
     around: bool
 
     def taken_from(self, log: GraspLog) -> FloatArray:
@@ -30,6 +35,14 @@ class Zero:
         drift = self.drift if self.around else np.zeros(3)
         free: FloatArray = log.force - self.offset - elapsed(log)[:, None, None, None] * drift
         return free
+
+    def strayed(self, time: float) -> FloatArray:
+        """How far an element's zero may be at that time, s, from where it is taken to be, [3] N: where free frames on
+        one side alone leave its drift open, as far as they seem to drift.
+        """
+        if self.around:
+            return np.zeros(3)
+        return np.asarray(abs(time - self.middle) * np.hypot(self.drift, self.drift_error))
 
 
 def elapsed(log: GraspLog) -> FloatArray:
@@ -56,6 +69,7 @@ def find_zero(log: GraspLog, free: BoolArray) -> Zero | None:
         offset_error=error * np.hypot(1.0, time.mean() / time.std() if around else 0.0),
         drift_error=error / time.std(),
         frames=len(time),
+        middle=float(time.mean()),
         around=around,
     )
 
@@ -64,8 +78,8 @@ def offsets(zero: Zero | None) -> list[PressResult]:
     """The offset along each axis that the elements have in common, N."""
     if zero is None or zero.frames < ESTIMATE.free_frames:
         return [_too_few(zero)] * 3
-    values = zero.offset.mean(axis=(0, 1))
-    return [PressEstimate(float(value), float(error)) for value, error in zip(values, zero.offset_error, strict=True)]
+    parts = zip(zero.offset.mean(axis=(0, 1)), zero.offset_error, zero.strayed(0.0), strict=True)
+    return [PressEstimate(*map(float, each)) for each in parts]
 
 
 def drifts(zero: Zero | None) -> list[PressResult]:

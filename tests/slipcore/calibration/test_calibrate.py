@@ -158,6 +158,8 @@ UNKNOWN: dict[str, tuple[Callable[[GraspLog], GraspLog], str]] = {
     "force_drift_x": (lambda log: log.take(slice(0, 80)), "lift the body"),
     "crosstalk_y": (lambda log: replace(log, displacement=log.displacement * [1.0, 1.0, 0.0]), "a load that leans"),
     "crosstalk_x": (lambda log: replace(log, force=None, normal=None), "no forces"),
+    "force_offset_y": (lambda log: replace(log, force=None, normal=None), "no forces"),
+    "inward_share": (lambda log: log.take(slice(30, 130)), "begin before the touch"),
     "gain": (lambda log: log, "no total force is given"),
 }
 
@@ -241,7 +243,7 @@ def test_logs_that_do_not_belong_together_are_refused(ball: GraspLog) -> None:
         calibrate_sensor([])
     with pytest.raises(InvalidInput, match="one sensor at a time"):
         calibrate_sensor([ball, replace(ball, sensor="another")])
-    with pytest.raises(InvalidInput, match="logs is number 1, the same press as 0; allowed: each press once"):
+    with pytest.raises(InvalidInput, match="logs is number 2, the same press as number 1; allowed: each press once"):
         calibrate_sensor([ball, replace(ball, metadata={"copy": "yes"})])
     forces_alone = replace(ball, displacement=np.zeros_like(ball.displacement), metadata={"displacement": "none"})
     assert calibrate_sensor([forces_alone, replace(forces_alone, force=1.01 * ball.force)]).presses == 2, "not the same"

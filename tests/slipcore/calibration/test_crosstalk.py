@@ -8,6 +8,7 @@ import pytest
 from slipcore.calibration.crosstalk import crosstalk, inward_share
 from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.press import PressLog, find_press
+from slipcore.calibration.zero import NO_ZERO
 from tests.slipcore.calibration.straight_press import LOAD, STEP, places, press, straight
 
 
@@ -47,11 +48,26 @@ def test_without_forces_or_depth_there_is_no_share() -> None:
     assert inward_share(find_press(replace(straight(), force=None))) == "the log has no forces"
 
 
-def test_without_a_frame_at_rest_zeros_of_elements_are_not_in_the_error() -> None:
-    seen = press()
-    found = inward_share(PressLog(seen.log, seen.level, np.zeros_like(seen.free)))
+def test_without_a_frame_at_rest_the_sum_of_zeros_would_look_like_a_share() -> None:
+    seen = press(tangential=(0.05, 0.0), added=np.array([1e-3, 0.0, 0.0]))
+    pressed = PressLog(seen.log, seen.level, np.zeros_like(seen.free))
+    assert crosstalk(pressed) == [NO_ZERO] * 2
+    assert inward_share(pressed) == NO_ZERO
+
+
+@pytest.mark.parametrize("kept", [slice(0, 26), slice(12, None)])
+def test_a_drift_that_one_side_leaves_open_is_in_what_more_presses_do_not_average_out(kept: slice) -> None:
+    drift = 1e-4 * STEP * np.arange(len(LOAD))[:, None, None, None] * np.array([1.0, 0.0, 0.0])
+    seen = find_press(straight(tangential=(0.05, 0.0), added=drift).take(kept))
+    assert seen.zero is not None
+    assert not seen.zero.around
+    found, across = crosstalk(seen)
     assert isinstance(found, PressEstimate)
-    assert found.error == pytest.approx(0.0, abs=1e-9)
+    assert isinstance(across, PressEstimate)
+    assert abs(found.value - 0.05) > 1e-3
+    assert abs(found.value - 0.05) < 1.96 * found.shared
+    assert across.shared == pytest.approx(0.0, abs=1e-12)
+    assert crosstalk(press(tangential=(0.05, 0.0), added=drift))[0][2] == 0.0
 
 
 @pytest.mark.parametrize("share", [0.1, -0.04])

@@ -71,3 +71,9 @@ def test_presses_without_noise_are_joined_as_those_with_next_to_none() -> None:
     nearly = joined("gain", "-", [PressEstimate(each.value, 1e-9) for each in results])
     assert exact.value == pytest.approx(1.05, rel=1e-12, abs=0.0)
     np.testing.assert_allclose([exact.low, exact.high], [nearly.low, nearly.high], rtol=1e-9, atol=0)
+
+
+def test_what_is_the_sensors_does_not_average_out_over_presses() -> None:
+    one, many = (joined("gain", "-", [PressEstimate(1.0, 0.1, 0.3)] * count) for count in (1, 100))
+    assert one.high - 1.0 == pytest.approx(NORMAL * np.hypot(0.1, 0.3), rel=1e-6)
+    assert many.high - 1.0 == pytest.approx(NORMAL * np.hypot(0.01, 0.3), rel=1e-6)

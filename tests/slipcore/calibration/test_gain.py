@@ -8,7 +8,7 @@ import pytest
 from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.gain import gain
 from slipcore.calibration.press import PressLog, find_press
-from tests.slipcore.calibration.straight_press import LOAD, press, shares, straight
+from tests.slipcore.calibration.straight_press import LOAD, STEP, press, shares, straight
 
 
 def test_a_gain_is_known_force_over_told_force() -> None:
@@ -27,6 +27,19 @@ def test_its_error_is_that_of_the_zero_of_all_elements() -> None:
     assert seen.zero is not None
     told = -seen.log.force[seen.held, ..., 2].sum(axis=(1, 2)).mean()  # type: ignore[index]
     assert found.error == pytest.approx(2.0 / told * 64 * seen.zero.offset_error[2] / told, rel=1e-3)
+
+
+@pytest.mark.parametrize("kept", [slice(0, 26), slice(12, None)])
+def test_a_drift_that_one_side_leaves_open_is_in_what_more_presses_do_not_average_out(kept: slice) -> None:
+    drift = -1e-3 * STEP * np.arange(len(LOAD))[:, None, None, None] * np.array([0.0, 0.0, 1.0])
+    found = gain(find_press(straight(newton=2.0, added=drift).take(kept)), 2.0)
+    assert isinstance(found, PressEstimate)
+    assert abs(found.value - 1.0) > 0.02
+    assert abs(found.value - 1.0) < 1.96 * found.shared
+    both = gain(press(newton=2.0, added=drift), 2.0)
+    assert isinstance(both, PressEstimate)
+    assert both.value == pytest.approx(1.0, rel=1e-9)
+    assert both.shared == 0.0
 
 
 REFUSED: dict[str, tuple[PressLog, float | None]] = {

@@ -130,7 +130,7 @@ def test_logs_that_are_no_presses_are_refused(logs: list[GraspLog], pressed: Pre
         calibrate_gel([still], [1.0], noise=1e-6)
     with pytest.raises(InvalidInput, match="logs is none"):
         calibrate_gel([], [])
-    with pytest.raises(InvalidInput, match="number 1, the same press as 0; allowed: each press once"):
+    with pytest.raises(InvalidInput, match="number 2, the same press as number 1; allowed: each press once"):
         calibrate_gel([log, log], [5.0, 5.0])
     with pytest.raises(InvalidInput, match="of several lattices"):
         calibrate_gel([log, pressed([1, 1])], FORCES)
