@@ -32,11 +32,14 @@ def read_log(
 
 
 def mapping_text(path: Path | None) -> str | None:
-    """What a mapping's file says, or the name of a preset."""
+    """What a mapping's file says, or the name of a preset; raises ``InvalidInput`` for neither."""
     from service.formats.presets import PRESETS
+    from slipcore import InvalidInput
 
     if path is None or (str(path) in PRESETS and not path.exists()):
         return None if path is None else str(path)
+    if not path.exists():
+        raise InvalidInput("mapping", f"{path}, no file", f"a file of JSON, or {' or '.join(PRESETS)}")
     return path.read_text(encoding="utf-8")
 
 

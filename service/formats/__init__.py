@@ -7,9 +7,10 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
-from service.formats import frame_table, rest, tac3d, tracked_markers
+from service.formats import frame_table, presets, rest, tac3d, tracked_markers
 from service.formats import mapping as mappings
 from service.formats.archive import open_archive
+from service.formats.delimited import split_header
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -250,8 +251,9 @@ def _sniff(path: Path, is_mapped: bool) -> str:
     if frame_table.looks_like(start):
         if is_mapped:
             return "frame table"
-        header = start.splitlines()[0].decode("utf-8", "replace")[:60]
-        raise UnsupportedFormat("file", f"a table that begins with {header!r}", TABLES)
+        header = start.splitlines()[0].decode("utf-8", "replace")
+        allowed = presets.instead(split_header(header)[0], TABLES)
+        raise UnsupportedFormat("file", f"a table that begins with {header[:60]!r}", allowed)
     if not start:
         raise UnsupportedFormat("file", "empty", KNOWN)
     raise UnsupportedFormat("file", f"of no known format (it starts with {start[:4]!r})", KNOWN)

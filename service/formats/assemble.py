@@ -31,7 +31,7 @@ MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 
 VECTORS = ("displacement", "position", "force", "normal")
 FLAT = ("position", "displacement")
-"""Vectors of which x and y may stand alone."""
+"""Vectors of which x and y may stand alone: what moves along the normal is then not known."""
 
 MASKS = tuple(name for name, dtypes in DTYPES.items() if dtypes == FLAG)
 
@@ -75,9 +75,14 @@ def _log(
             raise InvalidInput("height", "beside force alone", "displacement of markers beside both, or either alone")
         members["displacement"] = np.zeros(members["force"].shape)
         metadata["displacement"] = NONE
+    flat = len(mapping.origins["displacement"].fields) == 2
     for name in (*VECTORS, *MASKS):
         if name in members:
             members[name] = _on_grid(name, members[name], grid)
+    for name in members.keys() & FLAT:
+        if members[name].shape[-1:] == (2,):
+            members[name] = np.concatenate([members[name], np.zeros((*members[name].shape[:-1], 1))], axis=-1)
+            flat |= name == "displacement"
     if mapping.rest == rest.ALL_FRAMES and members.get("time", np.empty(0)).shape == (1,):
         members |= _held(members)
     if "displacement" in members and "observed" in members:
@@ -93,8 +98,7 @@ def _log(
     if not has_height and (mapping.rest is not None or mapping.is_of_places):
         _from_rest(members, mapping, metadata)
     _require("position", members, recording)
-    flat = not has_height and len(mapping.origins["displacement"].fields) == 2
-    unseen = flat and not {"force", "contact"} & members.keys()
+    unseen = flat and not has_height and not {"force", "contact"} & members.keys()
     if unseen:
         metadata["contact"] = BY_MOTION
     if "element_area" not in members:
@@ -254,7 +258,7 @@ def _read(recording: Recording, name: str, origin: Origin) -> NDArray[Any] | Non
     if len({part.shape for part in parts}) > 1:
         shapes = ", ".join(str(list(part.shape)) for part in parts)
         raise InvalidInput(name, f"of components of shapes {shapes}"[:200], "components of one shape")
-    if name in FLAT and len(parts) == 2:  # seen from above: what moves along the normal is not known
+    if name in FLAT and len(parts) == 2:
         parts.append(np.zeros_like(parts[0]))
     return np.stack(parts, axis=-1)
 
@@ -332,7 +336,9 @@ def _truth_values(name: str, array: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _on_grid(name: str, array: NDArray[Any], grid: tuple[int, int] | None) -> NDArray[Any]:
-    """A field on its lattice: [t, n, m, 3] (masks [t, n, m], position [n, m, 3]) from any flatter shape."""
+    """A field on its lattice: [t, n, m, 3] (masks [t, n, m], position [n, m, 3]) from any flatter shape; of ``FLAT``
+    with two components where it has no more.
+    """
     ndim = (0 if name in ONCE else 1) + 2 + (1 if name in VECTORS else 0)
     if array.ndim >= ndim:
         return array
@@ -340,6 +346,8 @@ def _on_grid(name: str, array: NDArray[Any], grid: tuple[int, int] | None) -> ND
         raise InvalidInput(name, f"of shape {list(array.shape)}", f"{ndim} axes, or a {_likely_grid(name, array)}")
     lead = () if name in ONCE else array.shape[:1]
     shape = (*lead, *grid, *((3,) if name in VECTORS else ()))
+    if name in FLAT and array.size == np.prod((*lead, *grid, 2), dtype=object):
+        shape = (*lead, *grid, 2)
     if array.size != np.prod(shape, dtype=object):
         raise InvalidInput(name, f"of shape {list(array.shape)}", f"{list(shape)} or as many numbers")
     return array.reshape(shape)

@@ -6,8 +6,10 @@ from typing import Any
 from service.json_objects import RepeatedKey, unique
 from slipcore.errors import InvalidInput
 
+ONE_OBJECT = "a JSON object"
 
-def parse(name: str, text: str | bytes, allowed: str = "a JSON object") -> Any:
+
+def parse(name: str, text: str | bytes, allowed: str = ONE_OBJECT) -> Any:
     """What a ``text`` says that is called ``name``; raises ``InvalidInput``, also where an object has a key twice."""
     try:
         return json.loads(text, object_pairs_hook=unique)
@@ -17,9 +19,9 @@ def parse(name: str, text: str | bytes, allowed: str = "a JSON object") -> Any:
         raise InvalidInput(name, f"not JSON ({str(error)[:80]})", allowed) from error
 
 
-def parse_object(name: str, text: str | bytes) -> dict[str, Any]:
+def parse_object(name: str, text: str | bytes, allowed: str = ONE_OBJECT) -> dict[str, Any]:
     """The same of one object; raises ``InvalidInput`` for anything else."""
-    found = parse(name, text)
+    found = parse(name, text, allowed)
     if not isinstance(found, dict):
-        raise InvalidInput(name, f"JSON of a {type(found).__name__}", "a JSON object")
+        raise InvalidInput(name, f"JSON of a {type(found).__name__}", allowed)
     return found

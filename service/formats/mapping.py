@@ -138,7 +138,7 @@ def parse(text: str) -> FieldMapping:
         raise InvalidInput("mapping", f"{len(text)} characters", f"at most {MAX_MAPPING_BYTES} bytes")
     if text.strip() in presets.PRESETS:
         text = json.dumps({"preset": text.strip()})
-    given = parse_object("mapping", text)
+    given = parse_object("mapping", text, f"a JSON object, or {' or '.join(presets.PRESETS)}")
     first, *others = [_parsed(each, given) for each in presets.alternatives(given)]
     return replace(first, alternatives=tuple(others))
 

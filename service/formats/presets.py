@@ -4,7 +4,8 @@ A preset has alternatives, for the same array is logged under several names; the
 ``{array}`` is the number of the sensor where a table has several, ``{again}`` what its repeated names end in.
 """
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from slipcore.errors import InvalidInput
@@ -66,3 +67,19 @@ def alternatives(given: Mapping[str, Any]) -> list[dict[str, Any]]:
         raise InvalidInput("array", repr(array)[:60], "0 to 99, the number of a sensor in the table")
     chosen = {key: value for key, value in given.items() if key not in ("preset", "array")}
     return [{**each, **chosen} for each in PRESETS[name](array)]
+
+
+def instead(names: Collection[str], otherwise: str) -> str:
+    """What is allowed of a table with columns of these ``names`` that no mapping explains: the preset whose forces they
+    are, where there is one, or else what is allowed ``otherwise``.
+    """
+    for preset, made in PRESETS.items():
+        patterns = ([_numbered(field) for field in each["force"]["field"]] for each in made(0))
+        if any(all(any(map(pattern.fullmatch, names)) for pattern in of_forces) for of_forces in patterns):
+            return f"mapping {preset}, which reads such columns, or {otherwise}"
+    return otherwise
+
+
+def _numbered(field: str) -> re.Pattern[str]:
+    """Names of a field with a number for its ``*``, in either case."""
+    return re.compile(re.escape(field).replace(r"\*", r"\d{1,6}"), re.ASCII | re.IGNORECASE)

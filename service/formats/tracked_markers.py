@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.formats import presets
 from service.formats import rest as rests
 from service.formats.delimited import parse_number, rows, split_header, text_lines
 from service.formats.npy import MAX_ARRAY_BYTES
@@ -163,11 +164,8 @@ def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
         missing.insert(0, "time or frame")
     if missing:
         value = f"a header without {', '.join(missing)} ({text[:60]!r})"
-        raise InvalidInput(
-            f"line {number}",
-            value,
-            "columns time or frame, marker, x, y; optional z, contact, fx with fy and fz, gripper_force",
-        )
+        columns_taken = "columns time or frame, marker, x, y; optional z, contact, fx with fy and fz, gripper_force"
+        raise InvalidInput(f"line {number}", value, presets.instead(names, columns_taken))
     if not columns.keys() >= set(FORCE):  # friction needs all three
         columns = {name: place for name, place in columns.items() if name not in FORCE}
     ignored = tuple(name for name in names if ALIASES.get(name) not in columns)

@@ -46,8 +46,10 @@ def test_a_mapping_is_a_file_or_else_a_preset(tmp_path: Path, monkeypatch: pytes
     assert inputs.mapping_text(Path("uskin")) == "uskin"
     Path("uskin").write_text('{"time": "µ"}', encoding="utf-8")
     assert inputs.mapping_text(Path("uskin")) == '{"time": "µ"}'
-    with pytest.raises(FileNotFoundError):
-        inputs.mapping_text(Path("absent.json"))
+    with pytest.raises(
+        InvalidInput, match="mapping is uskim, no file; allowed: a file of JSON, or papillarray or uskin"
+    ):
+        inputs.mapping_text(Path("uskim"))
 
 
 def test_rest_is_a_file_where_there_is_one_of_that_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,6 +72,20 @@ def test_places_seen_from_above_have_no_height_and_contact_is_estimated_from_mot
         assert "contact" not in made(flat, **parts, **known).metadata
 
 
+@pytest.mark.parametrize("grid", [None, (3, 3)])
+def test_of_arrays_x_and_y_are_enough_as_well(grid: tuple[int, int] | None) -> None:
+    plane = {"displacement": MOVED[..., :2], "position": PLACE[..., :2]}
+    if grid is not None:
+        plane = {"displacement": MOVED[..., :2].reshape(FRAMES, -1), "position": PLACE[..., :2].reshape(-1, 2)}
+    log = made(lattice=grid, **plane)
+    np.testing.assert_array_equal(log.displacement, MOVED * [1.0, 1.0, 0.0])
+    np.testing.assert_array_equal(log.position, PLACE)
+    assert log.metadata["contact"] == "estimated from motion"
+    assert "contact" not in made(lattice=grid, **plane, force=FORCE).metadata
+    with pytest.raises(InvalidInput, match="force is of shape"):
+        made(force=FORCE[..., :2])
+
+
 def test_a_lattice_is_that_of_the_mapping_of_the_file_or_of_the_shapes() -> None:
     flat = {"displacement": MOVED.reshape(FRAMES, 9, 3), "position": PLACE.reshape(9, 3)}
     np.testing.assert_array_equal(made({"grid": [3, 3]}, **flat).displacement, MOVED)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from service import formats
+from service.formats.mapping import parse
 from slipcore import GraspLog, InvalidInput
 
 PILLARS, FRAMES = 9, 5
@@ -115,3 +116,21 @@ def test_a_contact_that_the_caller_names_must_be_there(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"preset is of columns P\*_isInContct, not there"):
         formats.read(path, mapping='{"preset": "papillarray", "contact": "P*_isInContct"}')
     assert formats.read(path, mapping='{"preset": "papillarray"}').contact is not None
+
+
+@pytest.mark.parametrize("columns", [logger(0), recorder(0)])
+def test_a_table_without_a_mapping_is_answered_with_the_preset_that_reads_it(
+    tmp_path: Path, columns: dict[str, list[str]]
+) -> None:
+    path = written(tmp_path / "log.csv", columns)
+    for name in (None, "text/csv"):
+        with pytest.raises(InvalidInput, match="allowed: mapping papillarray, which reads such columns, or "):
+            formats.read(path, name)
+    other = written(tmp_path / "other.csv", {"a": ["1"], "P_FX": ["2"], "P0_FX": ["3"]})
+    with pytest.raises(InvalidInput, match="allowed: the columns of tracked markers"):
+        formats.read(other)
+
+
+def test_a_name_that_is_no_preset_is_answered_with_those_there_are() -> None:
+    with pytest.raises(InvalidInput, match="allowed: a JSON object, or papillarray or uskin"):
+        parse("papilarray")
