@@ -124,7 +124,7 @@ class Support:
 
 def support(model: Model, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
     """What the answer at v (m/s) and f_n (N an element) rests on; ``stale``: why the model is, if it is."""
-    reason = _implausible(model) or _below_zero(model, tangential_velocity, normal_force)
+    reason = _implausible(model) or _beyond_the_law(model, tangential_velocity, normal_force)
     if reason is not None:
         return Support("implausible", reason)
     changed = model.diagnostics.get("surface_change")
@@ -160,13 +160,14 @@ def kinds(
     v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
     if _implausible(model) is not None:
         return np.full(v.shape, "implausible")
-    below_zero = np.asarray(_interval(model, v, f_n)[0]) <= 0.0
+    friction = np.asarray(_interval(model, v, f_n)[0])
+    beyond = ~((friction > 0.0) & (friction <= 2.0 * _most_within(model)))
     is_stale = np.full(v.shape, stale is not None or bool(model.diagnostics.get("surface_change")))
     identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
     unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
-    each = {"implausible": below_zero, "stale": is_stale, "not identified": unknown, "extrapolated": outside}
+    each = {"implausible": beyond, "stale": is_stale, "not identified": unknown, "extrapolated": outside}
     return np.select([*each.values()], [*each], "supported")
 
 
@@ -292,15 +293,26 @@ def _implausible(model: Model) -> str | None:
     return None
 
 
-def _below_zero(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
-    """That no friction is as low as the law's at v and f_n, of a law that is plausible within its data."""
+def _beyond_the_law(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
+    """That no friction is what the law has at v and f_n, of a law that is plausible within its data: not above 0, or
+    over twice the most within the data, which is as far from it as 0 is.
+    """
     friction = float(_interval(model, tangential_velocity, normal_force)[0])
-    if friction > 0.0:
+    if 0.0 < friction <= 2.0 * _most_within(model):
         return None
     where = f"at {tangential_velocity:.4g} m/s and {normal_force:.4g} N an element"
+    much = ", over twice what it is within the data" if friction > 0.0 else ""
     return (
-        f"friction comes out at {friction:.3g} {where}, too far outside of the data for the law: record a grasp there"
+        f"friction comes out at {friction:.3g} {where}{much}, too far outside of the data for the law: "
+        "record a grasp there"
     )
+
+
+def _most_within(model: Model) -> float:
+    """The greatest friction that the law has within its data, at one of whose corners it is."""
+    b0, b1, b2 = model.coefficients.tolist()
+    velocities, forces = model.domain.tangential_velocity, model.domain.normal_force
+    return float(b0 + max(b1 * v for v in velocities) + max(b2 * f_n for f_n in forces))
 
 
 def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:

@@ -41,6 +41,12 @@ def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
             "comes out at -0.1 at 0 m/s and 0.5 N an element",
         ),
         (make_model((0.4, 0.0, -1.0), EXACT), 0.0, 0.39): ("extrapolated", "observed 0.002 to 0.3"),
+        (make_model((0.4, 4.0, 0.0), EXACT), 1e3, 0.1): (
+            "implausible",
+            "comes out at 4e+03 at 1000 m/s and 0.1 N an element, over twice what it is within the data, too far",
+        ),
+        (make_model((0.4, 4.0, 0.0), EXACT), 0.107, 0.1): ("extrapolated", "observed 0 to 0.004"),
+        (make_model((0.4, 4.0, 0.0), EXACT), 0.109, 0.1): ("implausible", "over twice"),
         (replace(known, identifiable=np.zeros(3, bool)), 0.0, 0.1): ("not identified", "no coefficient is known"),
         (replace(known, outdated=True), 0.0, 0.1): ("stale", "ask for a fit"),
         (replace(known, current=False), 0.0, 0.1): ("stale", "fetch the current model"),
