@@ -43,6 +43,7 @@ from stiction_client.exchange import (
 )
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
+from stiction_client.support import DISAGREEMENT, disagreement
 
 NOT_MODIFIED = 304
 
@@ -200,7 +201,18 @@ def model(name: str, method: str, kept: dict[str, CachedModel], stale_after: flo
     if method not in models:
         fitted = ", ".join(sorted(models)) or "none"
         raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {fitted}")
-    return models[method]
+    return _compared(method, models)
+
+
+def _compared(method: str, models: Mapping[str, FrictionModel]) -> FrictionModel:
+    """The model of a ``method``, with what others of the same logs say against it; those that take all samples for
+    independent are not asked.
+    """
+    model = models[method]
+    known = {name: each for name, each in models.items() if not each.outdated and "assumes" not in each.diagnostics}
+    others = {name: each for name, each in known.items() if name != method}
+    told = None if model.outdated else disagreement(method, model, others)
+    return model if told is None else replace(model, diagnostics={**model.diagnostics, DISAGREEMENT: told})
 
 
 def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:

@@ -19,7 +19,7 @@ from stiction_client.holding import LoadedContact
 from stiction_client.linear_friction import KINDS, check_model
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
-from stiction_client.support import Kind, kinds
+from stiction_client.support import DISAGREEMENT, Kind, kinds
 
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
@@ -328,7 +328,7 @@ def _one(
         friction_coefficient=float(loaded.quantile(loaded.unit * low)[0]),
         slip_probability=float(question.probability),
         within_domain=outside is None,
-        warning=support.warning(outside),
+        warning=support.warning(outside, str(question.model.diagnostics.get(DISAGREEMENT) or "")),
         of=question.of,
         elements=float(question.elements),
         support=support.kind,

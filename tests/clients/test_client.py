@@ -111,6 +111,24 @@ def test_who_names_no_method_gets_the_recommended_model_or_least_squares_of_an_o
     assert ask(service(answers.material), "model", "paper", "ols").method == "ols"
 
 
+def test_a_model_says_that_another_of_the_same_logs_contradicts_it_and_so_does_a_grip_by_it(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    first = answers.model | {"outdated": False}
+    other = first | {"method": "bayes", "coefficients": [0.3, -0.8, -0.35]}
+
+    def told(other: dict[str, Any]) -> Any:
+        return ask(
+            service(answers.material | {"models": {"ols": first, other["method"]: other}}), "model", "paper", "ols"
+        )
+
+    grip = stiction_client.required_normal_force(told(other), 0.2, 0.05, contact_area=1e-4)
+    assert "methods disagree by more than their intervals allow: bayes expects 0.299" in (grip.warning or "")
+    independent = other | {"method": "conjugate", "diagnostics": {"assumes": "independent errors"}}
+    for agreeing in (other | {"outdated": True}, other | {"coefficients": [0.409, -0.8, -0.35]}, independent):
+        assert told(agreeing).diagnostics == first["diagnostics"]
+
+
 def test_a_material_without_the_model_says_which_it_has(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     with pytest.raises(NoModel, match="'paper' has no fitted model of method 'bayes'; fitted: ols"):
         ask(service(answers.material), "model", "paper", method="bayes")
