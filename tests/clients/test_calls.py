@@ -334,7 +334,7 @@ def test_a_job_that_has_ended_is_not_waited_for(status: str) -> None:
 def test_a_model_is_asked_for_again_once_it_is_as_old_as_it_may_get(
     monkeypatch: pytest.MonkeyPatch, stale_after: float, age: float, is_asked: bool
 ) -> None:
-    model: Any = object()
+    model: Any = SimpleNamespace(outdated=True)  # which nothing is compared with
     material = Material("paper", "", "now", 3, {"ols": model}, "ols")
     monkeypatch.setattr(calls, "time", SimpleNamespace(monotonic=lambda: 100.0 + age))
     step = advance(calls.model("paper", "auto", {"paper": CachedModel(material, '"tag"', 100.0)}, stale_after), None)
