@@ -138,7 +138,7 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     if tangential_velocity > 0.0 and _knows_no_velocity(model):
         return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
     if not part <= UNCERTAIN or not any(model.identifiable.tolist()):
-        return Support("not identified", _ignorance(part))
+        return Support("not identified", _too_fast(model, tangential_velocity, normal_force) or _ignorance(part))
     reason = _takes_grasps_as_alike(model)
     if reason is not None:
         return Support("not identified", reason)
@@ -311,10 +311,11 @@ def _beyond_the_law(model: Model, tangential_velocity: float, normal_force: floa
 
 
 def _most_within(model: Model) -> float:
-    """The greatest friction that the law has within its data, at one of whose corners it is."""
+    """The greatest friction that the law has within its data, at one of whose corners it is; rest counts among them."""
     b0, b1, b2 = model.coefficients.tolist()
-    velocities, forces = model.domain.tangential_velocity, model.domain.normal_force
-    return float(b0 + max(b1 * v for v in velocities) + max(b2 * f_n for f_n in forces))
+    return float(
+        b0 + max(0.0, b1 * model.domain.tangential_velocity[1]) + max(b2 * f for f in model.domain.normal_force)
+    )
 
 
 def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:
@@ -324,8 +325,23 @@ def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force:
     return math.hypot(half, bend) / expected
 
 
+def _too_fast(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
+    """That friction is known where slip was seen, all of it faster than is asked for: more of the same tells nothing
+    of v. None where it is not so.
+    """
+    slowest = model.domain.tangential_velocity[0]
+    part = float(uncertainty(model, *within(model.domain, slowest, normal_force)))
+    asked = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    if not (tangential_velocity < slowest and part <= UNCERTAIN < asked):
+        return None
+    known = f"the expected friction is known to within ± {part:.1%} where slip was slowest, at {slowest:.4g} m/s"
+    return f"{known}, but not at {tangential_velocity:.4g} m/s: record slower slip"
+
+
 def _ignorance(part: float) -> str:
     """What to do where friction is known to such a ``part`` of itself, or no coefficient is."""
+    if part > 1.0:
+        return "the samples do not determine the expected friction there: record more grasps, and others"
     if not part <= UNCERTAIN:
         return f"the expected friction is known to within ± {part:.0%} only: record more grasps"
     return (

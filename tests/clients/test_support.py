@@ -73,6 +73,27 @@ def test_an_extrapolation_says_how_well_friction_is_known_there(make_model: Make
     assert f"known to within ± {np.hypot(slope, bend):.0%} there" in uncertain.support_at(0.4, 0.1).advice
 
 
+def test_friction_at_rest_asks_for_slower_slip_where_all_was_as_fast(make_model: Make) -> None:
+    """Of slip at 1 mm/s alone the law is known there, and its slope with velocity not at all."""
+    along = np.array([1.0, -1e3, 0.0])  # of β, by which friction at 1 mm/s stays
+    at_one = make_model((0.4, 0.0, 0.0), EXACT + 0.01 * np.outer(along, along))
+    at_one = replace(at_one, domain=replace(at_one.domain, tangential_velocity=(1e-3, 1e-3)))
+    assert at_one.support_at(1e-3, 0.1).kind == "supported"
+    assert at_one.support_at(0.0, 0.1) == Support(
+        "not identified",
+        "the expected friction is known to within ± 0.1% where slip was slowest, at 0.001 m/s, but not at 0 m/s: "
+        "record slower slip",
+    )
+    assert kinds(at_one, 0.0, 0.1) == "not identified"
+    steep = replace(at_one, coefficients=np.array([1.4, -1e3, 0.0]))  # 0.4 at 1 mm/s, and 1.4 at rest
+    assert (steep.support_at(0.0, 0.1).kind, kinds(steep, 0.0, 0.1)) == ("not identified", "not identified")
+
+
+def test_friction_that_could_be_anything_is_told_without_a_part_of_it(make_model: Make) -> None:
+    told = make_model((0.4, 0.0, 0.0), np.diag([1.0, 0.0, 0.0])).support_at(0.0, 0.1).advice
+    assert told == "the samples do not determine the expected friction there: record more grasps, and others"
+
+
 def test_velocities_that_nobody_knows_are_no_support(make_model: Make) -> None:
     told = "the object's motion is unknown"
     model = replace(make_model((0.4, 0.0, 0.0), EXACT), diagnostics={"unknown_velocity": told})
