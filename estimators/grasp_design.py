@@ -73,8 +73,21 @@ class Probing:
     velocity_spread: float = DESIGN.velocity_spread
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.drop_probability <= 0.5:
-            raise InvalidSamples("drop_probability", self.drop_probability, "above 0, at most 0.5")
+        for name, unit in (("speed", "m/s"), ("length", "m")):
+            values = getattr(self, name)
+            if not values or not all(0.0 < value < math.inf for value in values):
+                raise InvalidSamples(name, values, f"one or more, each above 0 {unit}")
+        for name, value, allowed in (
+            ("seconds", 0.0 <= self.seconds < math.inf, "s, at least 0"),
+            ("frame_rate", 0.0 < self.frame_rate < math.inf, "1/s, above 0"),
+            ("load", 0.0 <= self.load < math.inf, "N, at least 0"),
+            ("drop_probability", 0.0 < self.drop_probability <= 0.5, "above 0, at most 0.5"),
+            ("slipping", 0.0 < self.slipping <= 1.0, "a part of the contact, above 0 and at most 1"),
+            ("force_spread", 0.0 <= self.force_spread < math.inf, "a part of the mean, at least 0"),
+            ("velocity_spread", 0.0 <= self.velocity_spread < math.inf, "a part of the mean, at least 0"),
+        ):
+            if not value:
+                raise InvalidSamples(name, getattr(self, name), allowed)
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,6 +128,10 @@ def gather(
 ) -> FitData:
     """What a fit reads, from samples or moments of one grasp or of several; raises what ``observe`` raises."""
     parts = list(samples) if isinstance(samples, Sequence) else [samples]
+    for part in parts:
+        if not hasattr(part, "element_area"):
+            value = type(samples).__name__ + f" of {type(part).__name__}" * (samples is not part)
+            raise InvalidSamples("samples", value, "FrictionSamples or Moments of one grasp, or a list of these")
     moments = [part for part in parts if isinstance(part, SufficientStatistics)]
     if not moments:
         return _from_samples(observe(cast("list[FrictionSamples]", parts)))

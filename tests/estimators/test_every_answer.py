@@ -120,7 +120,7 @@ ANSWERS = {
     ),
     "next_grasp": Answer(
         of_design,
-        lambda grasp: [*astuple(grasp)[1:]],  # the force is in newtons of an element
+        lambda grasp: [*astuple(grasp)[1:-1]],  # the force is in newtons of an element, and the last a sentence
         nothing=TooFewSamples,
     ),
     "population_scatter": Answer(

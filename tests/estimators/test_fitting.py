@@ -1,10 +1,11 @@
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from estimators import Moments, fit, needs_samples
+from estimators import InvalidSamples, Moments, fit, needs_samples
 from slipcore.samples import FrictionSamples
 
 
@@ -50,3 +51,20 @@ def test_a_model_says_of_which_element_forces_are_where_these_differ(
         if method == "ols" or data is mixed:
             model = fit(data, method=method)
             assert (model.notes, model.element_area) == ((told,), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [(None, "NoneType"), (5, "int"), ("grasp.npz", "str of str"), ([1.0], "list of float"), ({}, "dict")],
+)
+def test_what_are_no_samples_are_refused_as_such(wrong: Any, told: str) -> None:
+    with pytest.raises(InvalidSamples, match=rf"^samples is {told}; allowed: FrictionSamples or Moments"):
+        fit(wrong, method="auto")
+
+
+@pytest.mark.parametrize("method", ["auto", "ols"])
+def test_a_model_names_the_sensor_that_all_grasps_are_of(samples: Callable[..., FrictionSamples], method: str) -> None:
+    grasps = [replace(samples(50, seed=seed), sensor="left") for seed in range(3)]
+    assert fit(grasps, method=method).diagnostics["sensor"] == "left"
+    for others in ([*grasps[:2], replace(grasps[2], sensor="right")], [replace(grasp, sensor="") for grasp in grasps]):
+        assert "sensor" not in fit(others, method=method).diagnostics

@@ -179,6 +179,27 @@ def test_a_working_point_that_cannot_be_is_refused(changes: dict[str, float]) ->
         replace(POINT, **changes)
 
 
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("speed", ()),
+        ("speed", (1e-3, 0.0)),
+        ("length", (-1e-3,)),
+        ("length", (math.inf,)),
+        ("seconds", -1.0),
+        ("frame_rate", 0.0),
+        ("load", -1.0),
+        ("load", math.nan),
+        ("slipping", 0.0),
+        ("force_spread", -0.1),
+        ("velocity_spread", math.nan),
+    ],
+)
+def test_what_no_robot_can_do_is_refused_by_name(name: str, wrong: object) -> None:
+    with pytest.raises(InvalidSamples, match=rf"^{name} is .*; allowed: "):
+        replace(Probing(), **{name: wrong})
+
+
 @pytest.mark.parametrize("forces", [(0.2, 0.1), (0.0, 0.1), (-0.1, 0.1), (0.1, math.inf), (math.nan, 0.1)])
 def test_forces_that_cannot_be_are_refused(forces: tuple[float, float]) -> None:
     with pytest.raises(InvalidSamples, match="normal_force"):
