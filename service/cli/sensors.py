@@ -131,7 +131,10 @@ def calibrate_gel(
     logs: Annotated[list[Path], typer.Argument(help="Logs of a round body pressed straight down on the sensor.")],
     known_force: Annotated[
         list[float] | None,
-        typer.Option(help="Normal force of the press where it is held, N: one of all logs, or given once for each."),
+        typer.Option(
+            help="Normal force of the press where it is held, N: one of all logs, or given once for each; "
+            "else what their grippers report."
+        ),
     ] = None,
     young_modulus: Annotated[float | None, typer.Option(help="Young's modulus, Pa, where it is known.")] = None,
     poisson_ratio: Annotated[float | None, typer.Option(help="Poisson's ratio, where it is known.")] = None,

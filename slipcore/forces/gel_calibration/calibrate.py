@@ -29,6 +29,7 @@ from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.uneven import thickest
 from slipcore.forces.recording import DisplacementData, error
+from slipcore.forces.tracking.known import KnownForce, reported
 from slipcore.frames import FloatArray, GraspLog
 
 GIVEN, PRIORS = "given", "the prior's: the presses hardly determine it"
@@ -95,17 +96,18 @@ def calibrate_gel(
 ) -> GelCalibration:
     """A gel from logs of presses on it: what is not given of it, from the displacement and the normal forces.
 
-    ``known_force`` N of each log's hold, None where unknown; at least one unless ``young_modulus`` is given. What is
-    given (Pa, m; ``thickness`` inf: a half-space) is taken as exact. ``noise`` m of a marker's coordinate (None:
-    estimated from each log). ``relative_thickness`` [n, m]: of a gel that is not alike thick everywhere, at each
-    marker, over ``thickness``, which is then finite. Of a log count the frames in which markers moved most. Raises
-    ``InvalidInput`` for what does not fit, also for logs in which nothing touches, and ``UnknownScale`` for a log not
-    in metres.
+    ``known_force`` N of each log's hold, to 1 %; where it is None, what the log's gripper reports, if it does. At least
+    one is known so, or ``young_modulus`` is given. What is given (Pa, m; ``thickness`` inf: a half-space) is taken as
+    exact. ``noise`` m of a marker's coordinate (None: estimated from each log). ``relative_thickness`` [n, m]: of a gel
+    that is not alike thick everywhere, at each marker, over ``thickness``, which is then finite. Of a log count the
+    frames in which markers moved most. Raises ``InvalidInput`` for what does not fit, also for logs in which nothing
+    touches, and ``UnknownScale`` for a log not in metres.
     """
     uneven = None if relative_thickness is None else tuple(tuple(map(float, row)) for row in relative_thickness)
     given = _checked(young_modulus, poisson_ratio, thickness, marker_depth, uneven)
-    forces = _forces(logs, known_force, young_modulus)
-    presses = _presses(logs, forces, marker_depth, noise, uneven)
+    presses = _presses(logs, known_forces(logs, known_force), marker_depth, noise, uneven)
+    if young_modulus is None and all(math.isnan(press.force) for press in presses.each):
+        raise InvalidInput("known_force", "none", "at least one, a gripper's in a log, or a given young_modulus")
     search = _GelSearch.begun(presses, young_modulus, given)
     search.climb()
     search.look_around()
@@ -122,16 +124,9 @@ def _checked(
     return Elasticity(math.nan if ratio is None else ratio, math.nan if thickness is None else 1.0 / thickness)
 
 
-def _forces(logs: Sequence[GraspLog], known: Sequence[float | None] | None, young: float | None) -> list[float]:
-    given = known_forces(logs, known)
-    if young is None and all(force is None for force in given):
-        raise InvalidInput("known_force", "none", "at least one, or a given young_modulus")
-    return [math.nan if force is None else float(force) for force in given]
-
-
 def _presses(
     logs: Sequence[GraspLog],
-    forces: list[float],
+    forces: list[float | None],
     marker_depth: float,
     noise: float | None,
     uneven: ThicknessMap | None,
@@ -146,7 +141,8 @@ def _presses(
     position, nodes = _lattice(first)
     recordings = [DisplacementData.of(log, noise) for log in logs]
     axes = min((recording.axes for recording in recordings), key=len)
-    each = tuple(_held(*pair, len(axes) * len(position)) for pair in zip(recordings, forces, strict=True))
+    known = [_known(*pair) for pair in zip(logs, forces, strict=True)]
+    each = tuple(_held(*pair, len(axes) * len(position)) for pair in zip(recordings, known, strict=True))
     return Presses(position, marker_depth, axes, nodes, each, first.position, uneven)
 
 
@@ -160,8 +156,19 @@ def _lattice(log: GraspLog) -> tuple[FloatArray, Nodes]:
     return position, nodes
 
 
-def _held(recording: DisplacementData, force: float, used: int) -> PressData:
-    """The mean over the frames that are like the one in which markers moved most, of the first ``used`` data."""
+def _known(log: GraspLog, force: float | None) -> KnownForce:
+    """The normal force of a press: the given one, else what the gripper reports."""
+    if force is not None:
+        return KnownForce.of(np.full(len(log), force), None, len(log))
+    if log.gripper_force is None:
+        return KnownForce.of(None, None, len(log))
+    return KnownForce.of(reported(log.gripper_force), log.gripper_force_deviation, len(log))
+
+
+def _held(recording: DisplacementData, known: KnownForce, used: int) -> PressData:
+    """The mean over the frames that are like the one in which markers moved most, of the first ``used`` data, and that
+    of the force where it is known there, whose error lasts.
+    """
     touched, strongest = recording.touched(), recording.strongest()
     if not touched.any():
         raise InvalidInput("logs", "one in which nothing touches", "presses that move markers by more than noise")
@@ -172,7 +179,11 @@ def _held(recording: DisplacementData, force: float, used: int) -> PressData:
     frames = touched & (change <= allowed) & (seen == seen[strongest]).all(axis=1)
     mean = data[frames].mean(axis=0)
     spread = error(mean, seen[strongest], recording.noise / math.sqrt(frames.sum()))
-    return PressData(mean, spread, force)
+    told = frames & known.given[:, 2]
+    if not told.any():
+        return PressData(mean, spread, math.nan, math.nan)
+    force, deviation = known.force[told, 2].mean(), known.deviation[told, 2].mean()
+    return PressData(mean, spread, float(force), float(deviation / force))
 
 
 @dataclass(slots=True, eq=False)

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from slipcore.contact.elasticity.grid import bounding_box
-from slipcore.forces.defaults import GEL, GEL_CALIBRATION, RECONSTRUCTION
+from slipcore.forces.defaults import GEL, GEL_CALIBRATION
 from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, choose_prior, fit, log_evidence
 from slipcore.forces.inverse.support import SupportCandidate, better_support, widened
 from slipcore.forces.operator.gel import Gel
@@ -45,12 +45,13 @@ class Elasticity(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class PressData:
     """Displacements ``data`` [m] m of one press with their standard deviation ``error`` [m], and its normal ``force``
-    N, NaN where it is not known.
+    N, NaN where it is not known, with its standard deviation as a share of it, ``tolerance``.
     """
 
     data: FloatArray
     error: FloatArray
     force: float
+    tolerance: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,7 +161,8 @@ def evaluate_gel(
         total, deviation, misfit = _resultant(observation, press.data, presses.nodes, contact)
         yields.append((total, deviation))
         misfits.append(misfit)
-    modulus = _modulus(np.array(yields), np.array([press.force for press in presses.each]), young_modulus)
+    known = np.array([(press.force, press.tolerance) for press in presses.each])
+    modulus = _modulus(np.array(yields), known, young_modulus)
     probability += modulus.log_probability
     return EvaluatedGel(elasticity, probability, tuple(found), modulus, np.array(yields)[:, 0], float(np.mean(misfits)))
 
@@ -207,13 +209,16 @@ def _resultant(
     return nodes.area * total, nodes.area * float(np.hypot(deviation, own)), float(residual @ residual / seen)
 
 
-def _modulus(yields: FloatArray, force: FloatArray, known: float | None) -> Modulus:
-    """Young's modulus by the ratios of known forces to resultants [i, 2] with deviations; all by logarithms."""
-    of_forces = np.isfinite(force)
+def _modulus(yields: FloatArray, forces: FloatArray, known: float | None) -> Modulus:
+    """Young's modulus by the ratios of known ``forces`` [i, 2], with their tolerances, to resultants [i, 2], with their
+    deviations; all by logarithms.
+    """
+    of_forces = np.isfinite(forces[:, 0])
     total, deviation = yields[of_forces].T
+    force, tolerance = forces[of_forces].T
     size = np.maximum(np.abs(total), np.finfo(float).tiny)
-    ratio = np.log(force[of_forces] / size)
-    variance = (deviation / size) ** 2 + RECONSTRUCTION.force_tolerance**2
+    ratio = np.log(force / size)
+    variance = (deviation / size) ** 2 + tolerance**2
     weight = 1.0 / variance
     if known is None:
         logarithm, own = float(weight @ ratio / weight.sum()), float(weight.sum() ** -0.5)

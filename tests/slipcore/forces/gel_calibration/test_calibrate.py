@@ -13,6 +13,7 @@ from slipcore.forces import Gel, GelCalibration, GelEstimate, calibrate_gel, rec
 from slipcore.forces.gel_calibration import calibrate
 from slipcore.forces.gel_calibration.bounded_gaussian import through
 from slipcore.forces.gel_calibration.calibrate import GIVEN, HALF_SPACE
+from slipcore.forces.recording import DisplacementData
 
 FORCES = [5.0, 10.0]
 """N of the frames in which the sphere is only pressed."""
@@ -43,6 +44,26 @@ def test_the_modulus_is_found_and_what_is_given_stays(stiffness: GelCalibration)
     assert (thickness.value, thickness.information, thickness.note) == (pytest.approx(5e-3), 0.0, GIVEN)
     np.testing.assert_allclose(stiffness.force, FORCES[:1], rtol=0.02)
     assert stiffness.misfit < 1.5
+
+
+def test_a_force_that_the_gripper_reports_is_known_as_well_as_it_says(
+    logs: list[GraspLog], stiffness: GelCalibration
+) -> None:
+    """To 1 % unless it says else; one that is given counts in its place."""
+    gripped = replace(logs[0], gripper_force=FORCES[:1] * 2, gripper_force_deviation=0.5)
+    about: dict[str, Any] = {"poisson_ratio": 0.49, "thickness": 5e-3, "noise": 1e-6}
+    found = calibrate_gel([gripped], **about)
+    assert found.gel.young_modulus == pytest.approx(stiffness.gel.young_modulus, rel=1e-3)
+    young = found.estimates[0]
+    assert np.log(young.high / young.low) == pytest.approx(2 * 1.96 * 0.1, rel=0.05)  # of 0.5 N in 5 N
+    as_usual = replace(logs[0], gripper_force=FORCES[:1] * 2)
+    held = [
+        calibrate._held(DisplacementData.of(as_usual, 1e-6), calibrate._known(as_usual, each), 9) for each in (None, 7)
+    ]
+    assert [(press.force, press.tolerance) for press in held] == [
+        (5.0, pytest.approx(0.01)),
+        (7.0, pytest.approx(0.01)),
+    ]
 
 
 def test_forces_in_another_unit_scale_the_modulus(logs: list[GraspLog], stiffness: GelCalibration) -> None:

@@ -10,20 +10,24 @@ TOLERANCE = RECONSTRUCTION.force_tolerance
 
 
 def test_the_modulus_is_the_geometric_mean_of_forces_over_resultants_by_their_weights() -> None:
-    """Ratios of 4e5 and 1e6, of which the second has three times the variance; a press of unknown force is left out."""
-    yields = np.array([[1e-5, 0.0], [-1e-5, 1e-5 * np.sqrt(2.0) * TOLERANCE], [7.0, 0.1]])
-    found = _modulus(yields, np.array([4.0, 10.0, np.nan]), None)
+    """Ratios of 4e5 and 1e6, of which the second has three times the variance, half of it its force's; a press of
+    unknown force is left out.
+    """
+    own = 1e-5 * np.sqrt(1.5) * TOLERANCE
+    yields = np.array([[1e-5, 0.0], [-1e-5, own], [7.0, 0.1]])
+    forces = [[4.0, TOLERANCE], [10.0, np.sqrt(1.5) * TOLERANCE], [np.nan, np.nan]]
+    found = _modulus(yields, np.array(forces), None)
     assert found.logarithm == pytest.approx((3.0 * np.log(4e5) + np.log(1e6)) / 4.0, rel=1e-12)
     assert found.deviation == pytest.approx(TOLERANCE * np.sqrt(3.0 / 4.0), rel=1e-12)
 
 
 def test_a_known_modulus_stays() -> None:
-    found = _modulus(np.array([[1e-5, 1e-6]]), np.array([4.0]), 3e5)
+    found = _modulus(np.array([[1e-5, 1e-6]]), np.array([[4.0, TOLERANCE]]), 3e5)
     assert (found.logarithm, found.deviation) == (pytest.approx(np.log(3e5)), 0.0)
 
 
 def test_of_an_unknown_modulus_the_probability_is_the_integral_over_all_that_might_be_known() -> None:
-    yields, force = np.array([[1e-5, 2e-7], [2e-5, 3e-6]]), np.array([4.0, 9.0])
+    yields, force = np.array([[1e-5, 2e-7], [2e-5, 3e-6]]), np.array([[4.0, TOLERANCE], [9.0, 0.05]])
     logarithms = np.linspace(np.log(1e5), np.log(2e6), 4001)
     known = [np.exp(_modulus(yields, force, np.exp(each)).log_probability) for each in logarithms]
     whole = np.sqrt(2.0 * np.pi) * np.exp(_modulus(yields, force, None).log_probability)
