@@ -386,6 +386,7 @@ def test_a_new_page_has_a_place_for_each_table(tmp_path: Path) -> None:
     assert "| slipcore | 20 | 0 | 0 | 0 | 0 | 0 | – | – |" in page.read_text()
 
 
+@pytest.mark.long
 def test_a_test_uses_what_functions_of_its_file_use() -> None:
     """``change`` asks for ``edits``, which the test itself does not name."""
     test = test_the_page_tells_score_and_survivors

@@ -45,6 +45,7 @@ def slip(population: list[tuple[Kind, FrictionModel]], of: str | None) -> np.nda
     return np.array(found)
 
 
+@pytest.mark.long
 def test_a_planned_contact_slips_as_often_as_was_asked(population: list[tuple[Kind, FrictionModel]]) -> None:
     """Within three standard errors of the mean over materials: a grasp of each would err by √(p (1 − p)/n) more."""
     found = slip(population, None)

@@ -11,7 +11,13 @@ def clean() -> list[GraspLog]:
     return grasps()[::2]
 
 
-@pytest.mark.parametrize("fault", ["offset of 5 mN", "drift of 1 mN/s", "crosstalk of 8, −5 %"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "offset of 5 mN",
+        *(pytest.param(each, marks=pytest.mark.long) for each in ("drift of 1 mN/s", "crosstalk of 8, −5 %")),
+    ],
+)
 def test_friction_of_a_sensor_that_errs_comes_out_right_once_it_is_calibrated(
     fault: str, clean: list[GraspLog]
 ) -> None:

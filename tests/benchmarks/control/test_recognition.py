@@ -24,7 +24,7 @@ def test_true_slip_is_none_at_rest_and_all_in_an_overloaded_contact() -> None:
     assert physics.stick_ratio(world, state, 0) == 0.0
 
 
-@pytest.mark.parametrize("lifted", [LIFTS[2], LIFTS[7], LIFTS[11]])
+@pytest.mark.parametrize("lifted", [LIFTS[2], *(pytest.param(LIFTS[k], marks=pytest.mark.long) for k in (7, 11))])
 def test_what_slips_under_a_force_that_is_held_still_shows_the_material_within_a_second(lifted: Task) -> None:
     """1.5 N at μ = 0.3, 2 N at 0.45 and 0.7: under a force that grew with the load hardly anything slipped.
 

@@ -115,7 +115,7 @@ def test_a_short_job_that_is_served_before_its_turn_keeps_no_other_key_back(data
         assert one in served(session)[:2]
 
 
-@pytest.mark.parametrize("long_ones_wait", [0, 3])
+@pytest.mark.parametrize("long_ones_wait", [0, pytest.param(3, marks=pytest.mark.long)])
 @pytest.mark.parametrize("one_runs", [True, False])
 def test_nor_does_a_long_one_let_a_new_key_overtake_those_whose_short_jobs_were_served_meanwhile(
     database: Database, paper: int, long_ones_wait: int, one_runs: bool

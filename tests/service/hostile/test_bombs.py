@@ -125,6 +125,7 @@ def bombs() -> list[tuple[bytes, str, str, set[int]]]:
     ]
 
 
+@pytest.mark.long
 def test_twenty_bombs_at_once_leave_the_server_small_and_quick(
     server: Server, record_property: Callable[[str, object], None]
 ) -> None:

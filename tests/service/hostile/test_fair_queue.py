@@ -156,6 +156,7 @@ class ThreadExecutor:
         pass
 
 
+@pytest.mark.long
 def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
     database: Database,
     make: Callable[..., str],

@@ -144,6 +144,7 @@ def wait_until_ready(client: httpx.Client, process: "subprocess.Popen[bytes]") -
     raise AssertionError("the service is not ready")
 
 
+@pytest.mark.long
 def test_the_service_does_its_work_under_the_units_restrictions(restricted: Restricted) -> None:
     keep_kernels(restricted.folder / "cache")
     made = restricted.run(restricted.stiction("keys", "create", "robot", "--scope", "admin", "--json"))

@@ -125,6 +125,7 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
         assert time.monotonic() - began < 30.0  # not for ever
 
 
+@pytest.mark.long
 def test_a_campaign_runs_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
     cluster.start_scheduler()
     cluster.start_worker()

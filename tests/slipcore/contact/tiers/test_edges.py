@@ -356,7 +356,7 @@ def test_a_mirror_turns_what_is_across_slip_and_a_quarter_turn_does_not() -> Non
     np.testing.assert_allclose(weights_of(slope, -slip, 0.2)[0], weights, atol=1e-12)
 
 
-@pytest.mark.parametrize("poisson", [0.3, 0.4999])
+@pytest.mark.parametrize("poisson", [0.3, pytest.param(0.4999, marks=pytest.mark.long)])
 def test_traction_in_partial_slip_without_a_closed_form_gains_an_order(poisson: float) -> None:
     def errors(cells: int) -> list[float]:
         grid = off_centre(cells, 2.15 * HERTZ.contact_radius)

@@ -53,6 +53,7 @@ def wedge_press() -> tuple[GraspLog, list[list[float]]]:
     return GraspLog(np.array([0.0, 0.1]), position, shown, 1e-6), relative.tolist()
 
 
+@pytest.mark.long
 def test_a_map_of_thickness_counts_in_the_modulus() -> None:
     log, relative = wedge_press()
     by_map, alike = (

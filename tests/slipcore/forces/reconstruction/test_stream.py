@@ -76,7 +76,7 @@ def test_forces_are_met_from_the_touch_on_and_end_with_it(pressed: Pressed) -> N
     assert lifted.force_deviation == 0.0
 
 
-@pytest.mark.parametrize(("thickness", "shown"), [(5e-3, True), (np.inf, False)])
+@pytest.mark.parametrize(("thickness", "shown"), [(5e-3, True), pytest.param(np.inf, False, marks=pytest.mark.long)])
 def test_in_the_plane_of_a_thick_gel_no_force_is_sure_for_a_detector(
     pressed: Pressed, thickness: float, shown: bool
 ) -> None:
