@@ -242,6 +242,8 @@ def _given(entry: dict[str, Any]) -> object:
 def _allowed(entry: dict[str, Any]) -> str:
     """What would be right, in words of ours where the framework's are a pattern, or no more than what is wrong."""
     kind, ctx = entry["type"], entry.get("ctx", {})
+    if kind in {"too_short", "too_long"} and isinstance(entry["input"], str):  # of what may also be nothing
+        kind = f"string_{kind}"
     if kind in WORDS_OF_KIND:
         return WORDS_OF_KIND[kind].format(**ctx)
     if kind == "string_pattern_mismatch":

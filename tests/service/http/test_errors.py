@@ -113,6 +113,8 @@ def test_what_the_framework_finds_wrong_is_told_as_any_wrong_value(
         ("string_type", 5, {}, "Input should be a valid string", "text"),
         ("list_type", 5, {}, "Input should be a valid list", "a list"),
         ("too_short", [], {"min_length": 1}, "List should have at least 1 item …", "1 or more of them"),
+        ("too_short", "", {"min_length": 1}, "Value should have at least …", "text of at least 1 character(s)"),
+        ("too_long", "ab", {"max_length": 1}, "Value should have at most …", "text of at most 1 characters"),
         ("too_long", [], {"max_length": 64}, "List should have at most 64 items …", "at most 64 of them"),
         ("string_pattern_mismatch", "a/b", {"pattern": NAME_PATTERN}, "String …", NAME_RULE.removesuffix(".")),
         ("string_pattern_mismatch", "x", {"pattern": "^a$"}, "String should match …", "text that matches ^a$"),
