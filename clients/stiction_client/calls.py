@@ -43,7 +43,7 @@ from stiction_client.exchange import (
 )
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
-from stiction_client.support import DISAGREEMENT, disagreement
+from stiction_client.support import CHOSEN_BECAUSE, DISAGREEMENT, disagreement
 
 NOT_MODIFIED = 304
 
@@ -196,23 +196,24 @@ def model(name: str, method: str, kept: dict[str, CachedModel], stale_after: flo
             if known is None:
                 raise
             warnings.warn(f"{error}; going on with the model of {name!r} from {known.age:.0f} s ago", StaleModel, 5)
-    models = known.material.models
+    models, because = known.material.models, known.material.because if method == "auto" else None
     method = known.material.recommended or method if method == "auto" else method
     if method not in models:
         fitted = ", ".join(sorted(models)) or "none"
         raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {fitted}")
-    return _compared(method, models)
+    return _compared(method, models, because)
 
 
-def _compared(method: str, models: Mapping[str, FrictionModel]) -> FrictionModel:
-    """The model of a ``method``, with what others of the same logs say against it; those that take all samples for
-    independent are not asked.
+def _compared(method: str, models: Mapping[str, FrictionModel], because: str | None) -> FrictionModel:
+    """The model of a ``method``, with why it is this one, and with what others of the same logs say against it; those
+    that take all samples for independent are not asked.
     """
     model = models[method]
     known = {name: each for name, each in models.items() if not each.outdated and "assumes" not in each.diagnostics}
     others = {name: each for name, each in known.items() if name != method}
     told = None if model.outdated else disagreement(method, model, others)
-    return model if told is None else replace(model, diagnostics={**model.diagnostics, DISAGREEMENT: told})
+    added = without_none(**{CHOSEN_BECAUSE: because, DISAGREEMENT: told})
+    return replace(model, diagnostics={**model.diagnostics, **added}) if added else model
 
 
 def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:

@@ -19,7 +19,7 @@ from stiction_client.linear_friction import (
     Scales,
     degrees_to_json,
 )
-from stiction_client.support import OUTDATED, SUPERSEDED, Domain
+from stiction_client.support import CHOSEN_BECAUSE, OUTDATED, SUPERSEDED, Domain
 
 VELOCITIES, FORCES = (0.0, 1e3, "m/s, as a magnitude"), (0.0, 1e300, "N an element")
 """At which velocities and normal forces a model may be asked."""
@@ -151,6 +151,12 @@ class FrictionModel(LinearFriction):
             return cls._read(record["model"])
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidArgument("file", path, f"a whole model (it lacks or garbles {error})") from error
+
+    @property
+    def chosen_because(self) -> str | None:
+        """Why this model answers who names no method, in a sentence; None where it is not known."""
+        told = self.diagnostics.get(CHOSEN_BECAUSE)
+        return None if told is None else str(told)
 
     @property
     def stale(self) -> str | None:

@@ -13,7 +13,8 @@ ENDED = frozenset({"done", "failed", "refused", "cancelled"})
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A material and its current models, one a method; ``recommended``: which of them answers who names no method.
+    """A material and its current models, one a method; ``recommended``: which of them answers who names no method, and
+    ``because`` why, in a sentence.
 
     ``withdrawn_grasp_logs``: how many of its ``grasp_logs`` count in no fit.
     """
@@ -25,6 +26,7 @@ class Material:
     models: Mapping[str, FrictionModel] = field(default_factory=dict)
     recommended: str | None = None
     withdrawn_grasp_logs: int = 0
+    because: str | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Material":
@@ -39,6 +41,7 @@ class Material:
             models=models,
             recommended=None if best is None else str(best["method"]),
             withdrawn_grasp_logs=int(record.get("withdrawn_grasp_logs", 0)),
+            because=None if best is None else best.get("because"),
         )
 
 

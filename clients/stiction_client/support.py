@@ -39,6 +39,8 @@ RECONSTRUCTED_FORCES = "reconstructed_forces"
 """Diagnostic, a sentence: how many of a material's logs have forces that no sensor measured."""
 ONE_RECORD = "one_record"
 """Diagnostic, a sentence: all samples are of one grasp, and why slopes are not known of them."""
+CHOSEN_BECAUSE = "chosen_because"
+"""Diagnostic, a sentence: why this model answers who names no method."""
 DISAGREEMENT = "disagreement"
 """Diagnostic, a sentence: that models of the material by other methods expect another friction (``disagreement``)."""
 NOTES = (

@@ -186,6 +186,7 @@ def plan(
     with connected(url, key) as client:
         model = _model(client, material, method)
     model = model if sensor is None else model.on_sensor(sensor)
+    because = model.chosen_because if method == "auto" else None
     answer = required_normal_force(
         model,
         load,
@@ -199,9 +200,10 @@ def plan(
         elements=elements,
     )
     if json:
-        print_json({"method": model.method, "version": model.version, **asdict(answer)})
+        chosen = {"method": model.method, "version": model.version, "chosen_because": because}
+        print_json(chosen | asdict(answer))
     else:
-        print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
+        print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model, because))
 
 
 def _model(client: "FrictionClient", material: str, method: str) -> "FrictionModel":
@@ -322,7 +324,7 @@ def _probe_lines(grasp: "NextGrasp") -> list[tuple[str, str | None]]:
     ]
 
 
-def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str, str | None]]:
+def _grip_lines(grip: "RequiredForce", model: "FrictionModel", because: str | None) -> list[tuple[str, str | None]]:
     whose = f"a contact of {grip.elements:.0f} elements" if grip.of == "contact" else "one element"
     most = grip.feasible_interval[1]
     return [
@@ -332,6 +334,7 @@ def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str
         ("largest load", f"{number(grip.largest_load)} N" if isfinite(grip.largest_load) else None),
         ("μ", f"{number(grip.friction_coefficient)}, so low in {whose} at {number(grip.element_force)} N an element"),
         ("model", f"{model.method}, version {model.version}"),
+        ("because", because),
         *_support(grip.support, grip.advice, grip.warning),
         *(("note", note) for note in grip.notes),
     ]

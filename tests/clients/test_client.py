@@ -107,8 +107,12 @@ def test_who_names_no_method_gets_the_recommended_model_or_least_squares_of_an_o
     answers.material["models"]["bayes"] = answers.model | {"method": "bayes"}
     if recommended != "missing":
         answers.material["recommended"] = recommended
-    assert ask(service(answers.material), "model", "paper").method == method
-    assert ask(service(answers.material), "model", "paper", "ols").method == "ols"
+    model, named = (
+        ask(service(answers.material), "model", "paper"),
+        ask(service(answers.material), "model", "paper", "ols"),
+    )
+    assert (model.method, named.method) == (method, "ols")
+    assert (model.chosen_because, named.chosen_because) == ("bayes: best" if method == "bayes" else None, None)
 
 
 def test_a_model_says_that_another_of_the_same_logs_contradicts_it_and_so_does_a_grip_by_it(
