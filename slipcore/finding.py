@@ -19,6 +19,7 @@ SEVERITIES: dict[str, Severity] = {
     "places for displacement": "warning",
     "element area": "warning",
     "repeated frames": "note",
+    "interpolated frames": "note",
     "force too large": "warning",
     "displacement too small": "note",
     "force pulls": "warning",

@@ -1,6 +1,8 @@
-"""Frames that a recorder wrote again, for its sensor had no new one: whole logs are looked at without them.
+"""Frames that are not the sensor's: those that a recorder wrote again, without which whole logs are looked at, and
+those that were interpolated.
 
-To the detector they are markers that stand still and then go twice as far, which it takes for noise.
+By the noise of three frames in a row repeated ones look as if fields were smoothed over neighbours, and were sharpened;
+of interpolated ones it is too small.
 """
 
 from dataclasses import fields, replace
@@ -8,7 +10,7 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.defaults import LIMITS, NOISE
+from slipcore.defaults import LIMITS, NOISE, FilterOptions
 from slipcore.frames import BoolArray, GraspLog
 from slipcore.patch_record import Patch
 from slipcore.slip_state import SlipHistory, slip_events
@@ -41,6 +43,33 @@ def own_frames(log: GraspLog) -> BoolArray:
     short = log.time[last] - log.time[first] < NOISE.stale_time
     own = ~same | ~np.repeat(short, last - first + 1)
     return own if np.count_nonzero(own) >= LIMITS.min_frames else np.ones(len(log), bool)
+
+
+def interpolated(log: GraspLog) -> BoolArray:
+    """Which frames [t] lie on the line between the one before and the one after, between which markers move; by as many
+    elements as show the noise.
+    """
+    step = max(1, log.displacement[0, ..., 0].size // NOISE.series)
+    place = log.displacement.reshape(len(log), -1, 3)[:, ::step].reshape(len(log), -1)
+    before, at, after = place[:-2], place[1:-1], place[2:]
+    share = ((log.time[1:-1] - log.time[:-2]) / (log.time[2:] - log.time[:-2]))[:, None]
+    between = np.zeros(len(log), bool)
+    off = np.abs(at - (1.0 - share) * before - share * after).max(axis=1)
+    between[1:-1] = (off <= NOISE.least_step) & (before != after).any(axis=1)
+    return between
+
+
+def noise_of_own_frames(log: GraspLog) -> dict[str, float]:
+    """The option that gives method "filter" the noise of markers, where frames between the sensor's hide it."""
+    from slipcore.noise import estimate_noise  # with its compiler, which the checks do without
+
+    between = interpolated(log)
+    if not between.any() or np.count_nonzero(~between) < LIMITS.min_frames:
+        return {}
+    own = log.take(~between)
+    series = np.moveaxis(own.displacement[..., :2], -1, 1).reshape(len(own), 2, -1)
+    noise = float(np.nan_to_num(estimate_noise(own.time, series)))
+    return {"displacement_floor": noise} if noise > FilterOptions().displacement_floor else {}
 
 
 def with_repeated(history: SlipHistory, log: GraspLog, own: BoolArray) -> SlipHistory:

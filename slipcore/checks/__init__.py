@@ -28,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     recording.places_for_displacement,
     recording.element_area,
     recording.repeated_frames,
+    recording.interpolated_frames,
     recording.force_unit,
     recording.displacement_unit,
     recording.force_sign,

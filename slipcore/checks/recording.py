@@ -8,7 +8,7 @@ from slipcore.checks.subject import Subject
 from slipcore.defaults import LIMITS
 from slipcore.finding import Finding
 from slipcore.frames import BY_MOTION, BoolArray, GraspLog
-from slipcore.repeated_frames import repeated
+from slipcore.repeated_frames import interpolated, repeated
 from slipcore.saturation import saturated
 
 
@@ -87,6 +87,14 @@ def repeated_frames(seen: Subject) -> Iterator[Finding]:
     if len(seen.log) > LIMITS.min_frames and share > seen.limits.repeated_share:
         evidence = f"{share:.0%} of the frames are copies of the one before"
         yield Finding("repeated frames", evidence, "record each frame once, with the time at which the sensor took it")
+
+
+def interpolated_frames(seen: Subject) -> Iterator[Finding]:
+    """A log that was resampled: what lies between the sensor's frames was not measured."""
+    share = float(interpolated(seen.log)[1:-1].mean()) if len(seen.log) > LIMITS.min_frames else 0.0
+    if share > seen.limits.repeated_share:
+        evidence = f"{share:.0%} of the frames lie on the line between the one before and the one after"
+        yield Finding("interpolated frames", evidence, "record the sensor's own frames, with the time of each")
 
 
 def force_unit(seen: Subject) -> Iterator[Finding]:

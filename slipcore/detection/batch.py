@@ -21,7 +21,7 @@ from slipcore.finding import Finding
 from slipcore.frames import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.regimes import slips_as_a_whole
-from slipcore.repeated_frames import own_frames, with_repeated
+from slipcore.repeated_frames import noise_of_own_frames, own_frames, with_repeated
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
 from slipcore.surface.log_normals import with_normals
 
@@ -40,15 +40,15 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Frames that a recorder wrote
-    again count as the one that they repeat (``repeated_frames``). Forces that are clearly late, or
-    have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens what the sensor
-    smoothed, as far as the log's noise shows how widely, unless options give it, and takes reconstructed forces as
-    ``for_reconstructed_forces`` says. A log without displacement is left to method "forces_only" where the
-    default would see nothing; which method suits a log best, ``recommended_method`` says. ``options`` are the
-    method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes
-    before their defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor
-    model's.
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Frames that a recorder wrote again
+    count as the one that they repeat, and hide no noise where they were interpolated (``repeated_frames``). Forces that
+    are clearly late, or have crosstalk in them, are mended first (``contradicting_forces``). Method "filter" sharpens
+    what the sensor smoothed, as far as the log's noise shows how widely, unless options give it, and takes
+    reconstructed forces as ``for_reconstructed_forces`` says. A log without displacement is left to method
+    "forces_only" where the default would see nothing; which method suits a log best, ``recommended_method`` says.
+    ``options`` are the method's, and ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of
+    noise and smoothing goes before their defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another
+    lattice than the sensor model's.
     """
     if not log.sees_along_surface:
         allowed = (
@@ -72,7 +72,7 @@ def detect_slip(
     estimated = {}
     if method == DEFAULT_METHOD:
         estimated = {name: width for name, width in kernels_of(log).items() if name not in options}
-        options |= estimated
+        options = noise_of_own_frames(log) | options | estimated
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         history = history_of(log, state, checked_lookahead(lookahead))

@@ -1,13 +1,13 @@
-"""What a recorder wrote again, for its sensor had nothing new, changes nothing in what is found."""
+"""What a recorder wrote again or interpolated, for its sensor had nothing new, changes nothing in what is found."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from slipcore import GraspLog, collect_friction, contact_friction, detect_slip
+from slipcore import GraspLog, check_log, collect_friction, contact_friction, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.repeated_frames import own_frames, repeated
+from slipcore.repeated_frames import interpolated, noise_of_own_frames, own_frames, repeated
 
 
 def again(log: GraspLog, source: np.ndarray, time: np.ndarray) -> GraspLog:
@@ -64,6 +64,39 @@ def test_repeated_frames_give_no_samples_of_their_own() -> None:
     np.testing.assert_array_equal(found.samples.tangential_velocity, own.samples.tangential_velocity)
     np.testing.assert_array_equal(found.samples.time, own.samples.time)
     assert found.contact == own.contact
+
+
+def resampled(log: GraspLog, times: int) -> GraspLog:
+    """With frames on the line between each two of its own, so many ``times`` as many."""
+    assert log.force is not None
+    at = np.arange((len(log) - 1) * times + 1) / times
+    before = np.minimum(at.astype(int), len(log) - 2)
+    share = (at - before)[:, None, None, None]
+    displacement, force = (
+        (1.0 - share) * each[before] + share * each[before + 1] for each in (log.displacement, log.force)
+    )
+    time = np.interp(at, np.arange(len(log)), log.time)
+    return replace(log, time=time, displacement=displacement, force=force, normal=None, truth=None, object_pose=None)
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_interpolated_frames_hide_no_noise(short_ramp: GraspLog, times: int) -> None:
+    log = resampled(short_ramp, times)
+    between = np.arange(len(log)) % times != 0
+    np.testing.assert_array_equal(interpolated(log), between)
+    (option,) = noise_of_own_frames(log).values()
+    assert option == pytest.approx(1e-6, rel=0.1)
+    given = detect_slip(log, displacement_floor=option)
+    np.testing.assert_array_equal(detect_slip(log).probability, given.probability)
+    assert "interpolated frames" in {each.name for each in check_log(log, given)}
+
+
+def test_no_frame_of_a_sensor_is_taken_for_interpolated(short_ramp: GraspLog) -> None:
+    assert not interpolated(short_ramp).any()
+    still = again(short_ramp, np.full(len(short_ramp), 30), short_ramp.time)
+    assert not interpolated(still).any()
+    assert noise_of_own_frames(still) == {}
+    assert not interpolated(short_ramp.take(slice(0, 2))).any()
 
 
 def test_what_stands_still_for_longer_than_a_recorder_waits_stays(short_ramp: GraspLog) -> None:
