@@ -102,23 +102,44 @@ def _summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
         "macro_slip_frames": sum(state["macro_slip"] for state in states),
         "friction": states[-1]["friction"] if states else None,
         "findings": states[-1].get("findings", []) if states else [],
+        "forces": _forces([state["force"] for state in states if state.get("force")]),
     }
 
 
+def _forces(told: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """Where forces of frames that had none are from, by what each state told of them."""
+    if not told:
+        return None
+    waiting = sum(each.get("wait_for") is not None for each in told)
+    return {"source": told[-1]["source"], "reason": told[-1].get("reason"), "waiting_frames": waiting}
+
+
 def _lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
-    refused, friction = summary["refused_frames"], summary["friction"]
+    refused, friction, forces = summary["refused_frames"], summary["friction"], summary["forces"]
     return [
         ("frames", f"{summary['frames']}{f', and {refused} refused' if refused else ''}"),
         ("least stick ratio", number(summary["stick_ratio_min"])),
         ("gross slip", f"in {summary['macro_slip_frames']} frames"),
-        ("friction", _friction(friction) if friction else _why_none(summary["findings"])),
+        ("forces", _told_forces(forces)),
+        ("friction", _friction(friction) if friction else _why_none(summary["findings"], forces)),
         ("grasp log", summary["grasp_log"]),
     ]
 
 
-def _why_none(findings: list[dict[str, str]]) -> str:
+def _told_forces(forces: dict[str, Any] | None) -> str | None:
+    if forces is None:
+        return None
+    if forces["source"] == "none":
+        return f"none: {forces['reason']}"
+    waiting = forces["waiting_frames"]
+    return "reconstructed from displacement" + (f", not yet known in {waiting} frames" if waiting else "")
+
+
+def _why_none(findings: list[dict[str, str]], forces: dict[str, Any] | None) -> str:
     reasons = [f"{finding['evidence']}; {finding['remedy']}" for finding in findings]
-    return f"no samples: {'; '.join(reasons) or 'nothing slipped, or there are no forces'}"
+    are_found = forces is not None and forces["source"] != "none"
+    why = "elements' forces are too unsure" if are_found else "there are no forces"
+    return f"no samples: {'; '.join(reasons) or f'nothing slipped, or {why}'}"
 
 
 def _friction(found: dict[str, Any]) -> str:

@@ -369,7 +369,7 @@ def test_what_a_replayed_stream_answered_is_counted() -> None:
     summary = streaming._summary(answers)
     assert summary == {
         "frames": 3, "refused_frames": 1, "stick_ratio_min": 0.25, "macro_slip_frames": 1, "friction": FRICTION,
-        "findings": [],
+        "findings": [], "forces": None,
     }  # fmt: skip
     told = dict(streaming._lines(summary | {"grasp_log": None}))
     assert (told["frames"], told["least stick ratio"], told["gross slip"]) == (
@@ -393,6 +393,22 @@ def test_why_a_replayed_stream_has_no_samples_is_told_with_what_to_do() -> None:
         assert dict(streaming._lines(summary | {"grasp_log": None}))["friction"] == f"no samples: {why}"
     of_before = {name: value for name, value in STATE.items() if name != "findings"}
     assert streaming._summary([of_before])["findings"] == []
+
+
+def test_where_a_replayed_streams_forces_are_from_is_told() -> None:
+    found = {"source": "reconstructed", "wait_for": None}
+    for told, forces, friction in (
+        ([found | {"wait_for": "noise"}, found], "reconstructed from displacement, not yet known in 1 frames", "elem"),
+        ([found], "reconstructed from displacement", "elements' forces are too unsure"),
+        ([{"source": "none", "reason": "too many markers"}], "none: too many markers", "there are no forces"),
+        ([None], None, "there are no forces"),
+    ):
+        lines = dict(
+            streaming._lines(streaming._summary([STATE | {"force": each} for each in told]) | {"grasp_log": None})
+        )
+        assert lines["forces"] == forces
+        assert lines["friction"] is not None
+        assert lines["friction"].startswith(f"no samples: nothing slipped, or {friction}")
 
 
 @pytest.mark.parametrize("error", [None, math.inf])
