@@ -16,6 +16,7 @@ from stiction_client.errors import InvalidArgument
 from stiction_client.support import (
     ONLY_SENSOR,
     UNKNOWN_SENSOR,
+    UNNAMED_SENSOR,
     Domain,
     Kind,
     Support,
@@ -313,6 +314,8 @@ class LinearFriction:
         only = self.diagnostics.get(ONLY_SENSOR)
         if only is None:
             known = "this fit does not separate the sensors of its grasps"
+        elif only == UNNAMED_SENSOR:
+            known = f"no grasp of it names its sensor, so that none is known to be by {name!r}"
         else:
             known = f"all grasps of it are by a sensor {only!r}, none by {name!r}{_near(name, [str(only)])}"
         return self._noting(f"{known}: the answer does not allow for the gain of another sensor")

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from slipcore.frames import UNNAMED
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import Scale, Scales, SensorFriction, SensorScale
+from stiction_client.support import UNNAMED_SENSOR
 from tests.service.report.test_material import MODEL
 
 COVARIANCE = np.array([[4e-4, 1e-3, -2e-3], [1e-3, 1.0, 0.1], [-2e-3, 0.1, 4.0]])
@@ -141,6 +143,10 @@ def test_a_known_sensor_answers_by_itself_and_by_its_own_elements_where_these_ar
     assert "did you mean" not in SENSED.of_sensor("xyz").notes[0]
 
 
+def test_a_log_that_names_no_sensor_is_called_so_on_both_sides() -> None:
+    assert UNNAMED_SENSOR == UNNAMED
+
+
 def test_a_model_that_separates_no_sensors_says_so_where_another_than_its_own_is_asked_for() -> None:
     alone = replace(SCALED, diagnostics={"sensor": "left"})
     other = alone.on_sensor("lefft")
@@ -149,6 +155,10 @@ def test_a_model_that_separates_no_sensors_says_so_where_another_than_its_own_is
         "the answer does not allow for the gain of another sensor",
     )
     assert other.predict(*INSIDE, 0.05) == alone.predict(*INSIDE, 0.05)
+    assert replace(PLAIN, diagnostics={"sensor": "unknown"}).of_sensor("left").notes == (
+        "no grasp of it names its sensor, so that none is known to be by 'left': "
+        "the answer does not allow for the gain of another sensor",
+    )
     assert PLAIN.of_sensor("left").notes == (
         "this fit does not separate the sensors of its grasps: "
         "the answer does not allow for the gain of another sensor",
