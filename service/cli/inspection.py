@@ -63,9 +63,10 @@ def inspect_log(
 
 def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
     """How the log's own forces agree with those by the gel alone, where there are both, in ``COMPARED_FRAMES`` of those
-    in which something touches; raises ``InvalidInput`` for a log of forces alone.
+    in which something touches; None of forces that are reconstructed themselves. Raises ``InvalidInput`` for a log of
+    forces alone.
     """
-    if gel is None or log.force is None:
+    if gel is None or log.force is None or log.has_reconstructed_force:
         return None
     import numpy as np
 
@@ -106,7 +107,8 @@ def with_forces_by(gel: Path | None, log: "GraspLog") -> "tuple[GraspLog, Recons
         return log, None
     described = _read_json(gel, "gel")
     if log.force is not None:
-        typer.echo(f"{gel.name}: slip and friction are by the log's own forces", err=True)
+        whose = "the forces in it, which were reconstructed" if log.has_reconstructed_force else "the log's own forces"
+        typer.echo(f"{gel.name}: slip and friction are by {whose}", err=True)
         return log, None
     return with_forces(log, described)
 

@@ -22,6 +22,8 @@ def test_forces_are_compared_where_there_are_both(tmp_path: Path) -> None:
     plain = GraspLog(np.arange(2.0), PLACE, STILL, 1e-6)
     assert comparison(plain, gel) is None
     assert comparison(GraspLog(np.arange(2.0), PLACE, STILL, 1e-6, force=STILL), None) is None
+    found = GraspLog(np.arange(2.0), PLACE, STILL, 1e-6, force=STILL, metadata={"force": "reconstructed"})
+    assert comparison(found, gel) is None  # with themselves all forces agree
     alone = GraspLog(np.arange(2.0), PLACE, STILL, 1e-6, force=STILL, metadata={"displacement": "none"})
     with pytest.raises(InvalidInput, match="gel is given for a log of forces alone; allowed: a log with displacement"):
         comparison(alone, gel)
