@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import borrowed, compiled
 from slipcore.detection.filter.backward_pass import step_back
-from slipcore.detection.filter.run import filter_frame
+from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.state import EXPECTED, PROBABILITY
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
 from slipcore.detection.shared.decision import apply_decision
-from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace
+from slipcore.detection.shared.records import Memory, Plain, named
 from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.frames import BoolArray, FloatArray
 
@@ -50,17 +50,18 @@ class Rings(NamedTuple):
 @compiled
 def fold(
     is_filter: bool,
-    sensor: DetectorSetup,
+    sensor: Plain,
     log: LogArrays,
     rings: Rings,
     lookahead: int,
-    room: Workspace,
+    room: Plain,
     results: FrameResults,
 ) -> float:
     """Fill ``results`` from the second frame on, by method "filter" or else "strain_rate"; marker noise at the end, m.
 
     ``rings`` hold the memory after the first frame. With a ``lookahead`` each frame is decided in the light of that
-    many after it, for which the filter alone remembers enough.
+    many after it, for which the filter alone remembers enough. ``sensor`` and ``room`` are a ``DetectorSetup`` and
+    a ``Workspace`` as plain tuples, as a detector's step hands them to its kernel, which is compiled once for both.
     """
     sensor, log, rings, room, results = borrowed((sensor, log, rings, room, results))
     frames, sigma = len(log.time), np.nan
@@ -68,7 +69,7 @@ def fold(
         last, frame = frame_at(log, k - 1), frame_at(log, k)
         before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
         given = sensor, last, frame, before, after, room, results.velocity[k]
-        found = filter_frame(*given) if is_filter else run_strain_rate(*given)
+        found = run_filter(*given) if is_filter else run_strain_rate(*given)
         sigma, results.touching[k], results.slipping[k] = found
         if 0 < lookahead < k:
             revise(sensor, log, rings, k - lookahead, k, room, results)
@@ -90,34 +91,39 @@ def _ring(size: int, first: FloatArray) -> FloatArray:
 
 
 @compiled
-def frame_at(log: LogArrays, k: int) -> FrameArrays:
-    """One frame of a log."""
-    return FrameArrays(
-        log.time[k], log.displacement[k], log.force[k], log.object_pose[k], log.normal[k], log.contact[k]
-    )
+def frame_at(log: LogArrays, k: int) -> Plain:
+    """One frame of a log: what ``FrameArrays`` has, as a plain tuple."""
+    return log.time[k], log.displacement[k], log.force[k], log.object_pose[k], log.normal[k], log.contact[k]
 
 
 @compiled
-def memory_at(results: FrameResults, rings: Rings, k: int) -> Memory:
-    """What is remembered of one frame, or will be; what is found goes straight to its place."""
+def memory_at(results: FrameResults, rings: Rings, k: int) -> Plain:
+    """What a ``Memory`` has of one frame, or will have, as a plain tuple; what is found goes straight to its place."""
     noise, common = rings.noise[k % 2], rings.common[k % 2]
     elements = rings.elements[k % len(rings.elements)]
-    return Memory(results.contact[k], results.slip[k], results.probability[k], noise, elements, common)
+    return results.contact[k], results.slip[k], results.probability[k], noise, elements, common
 
 
 @compiled(inline=True)
 def revise(
-    sensor: DetectorSetup, log: LogArrays, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
+    given: Plain,
+    log: LogArrays,
+    rings: Rings,
+    k: int,
+    last: int,
+    working: Plain,
+    results: FrameResults,
 ) -> None:
     """Decide frame ``k`` again, in the light of what the filter remembers up to frame ``last``."""
+    frames = frame_at(log, k - 1), frame_at(log, k)
+    memories = memory_at(results, rings, k - 1), memory_at(results, rings, k)
+    sensor, earlier, frame, before, after, room = named(given, *frames, *memories, working)
     elements, posterior = rings.elements, room.weight  # free until the decision is applied
     kept, least = len(elements), sensor.settings[LEAST_TRANSITION]
     posterior[:] = elements[last % kept, PROBABILITY]
     for i in range(last - 1, k - 1, -1):
         step_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, posterior)
     decide(posterior, elements[k % kept, EXPECTED], sensor.settings[THRESHOLD], room.decision)
-    before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
-    frames = frame_at(log, k - 1), frame_at(log, k)
     results.touching[k], results.slipping[k] = apply_decision(
-        sensor.position, *frames, room.decision, before, after, room.weight, results.velocity[k]
+        sensor.position, earlier, frame, room.decision, before, after, room.weight, results.velocity[k]
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from slipcore.detection.detector import DetectorState, step
 from slipcore.detection.fold import FrameResults, LogArrays, fold, rings_from
 from slipcore.detection.methods import findings_by
-from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, workspace
+from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, shared_workspace
 from slipcore.detection.sharpening import sharpened
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.gross_slip import find_gross_slip
@@ -26,11 +26,11 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     results.touching[0], results.slipping[0] = memory.contact.sum(), memory.slip.sum()
     is_filter = setup.method == "filter"
     ahead = lookahead if is_filter else 0
-    room = workspace(*memory.probability.shape)
+    room = shared_workspace(*memory.probability.shape)
     rings = rings_from(memory, ahead)
     displacement, force = sharpened(log.displacement, log.force, setup.options, setup.element_area)
     recording = _recording(log, displacement, force)
-    noise = fold(is_filter, setup.sensor, recording, rings, ahead, room, results)
+    noise = fold(is_filter, tuple(setup.sensor), recording, rings, ahead, room, results)
     found = findings_by(setup.method, rings.common[(len(log) - 1) % 2], noise)
     return replace(_history(log, setup.method, noise, results), findings=found)
 

@@ -24,20 +24,7 @@ def run_filter(
     """Fill the memory ``after`` and ``velocity``; marker noise, m (NaN if unknown), and how many elements touch and
     slip. What it is given may be plain tuples of the same entries.
     """
-    return filter_frame(*named(sensor, last, frame, before, after, room), velocity)
-
-
-@compiled(inline=True)
-def filter_frame(
-    sensor: DetectorSetup,
-    last: FrameArrays,
-    frame: FrameArrays,
-    before: Memory,
-    after: Memory,
-    room: Workspace,
-    velocity: FloatArray,
-) -> tuple[float, int, int]:
-    """The same of what has names."""
+    sensor, last, frame, before, after, room = named(sensor, last, frame, before, after, room)
     has_force = observe(sensor, last, frame, before, after, room, False)
     step_filter(sensor, last, frame, before, after, room, has_force)
     touching, slipping = apply_decision(

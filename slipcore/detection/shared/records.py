@@ -1,7 +1,7 @@
 """What compiled steps take and fill, as named tuples of plain arrays; a field that a frame does not have is empty."""
 
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from slipcore.surface.log_normals import normals_at_rest
 from slipcore.surface.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
+Plain: TypeAlias = Any
+"""A named tuple of these, at any depth, as a plain one."""
+
 _SERIES, _ROWS = max(NOISE.series, NOISE.memory), 18
 
 
@@ -156,13 +159,13 @@ def workspace(n: int, m: int) -> Workspace:
     return Workspace(surface, decision, np.empty(shape), series, places, rows, np.empty((2, n, m)))
 
 
-def plain(room: Workspace) -> tuple[Any, ...]:
+def plain(room: Workspace) -> Plain:
     """The same as plain tuples."""
     return tuple(tuple(part) if isinstance(part, tuple) else part for part in room)
 
 
 @lru_cache(maxsize=2)
-def shared_workspace(n: int, m: int) -> tuple[Any, ...]:
+def shared_workspace(n: int, m: int) -> Plain:
     """Room as plain tuples for steps that are one compiled call, the same for all detectors: such a call keeps the
     interpreter's lock, so that no two of them are in it at once.
     """
