@@ -47,7 +47,8 @@ def own_frames(log: GraspLog) -> BoolArray:
 
 def interpolated(log: GraspLog) -> BoolArray:
     """Which frames [t] lie on the line between the one before and the one after, between which markers move; by as many
-    elements as show the noise.
+    elements as show the noise. None where such stretches are fewer than the longest has frames: markers without noise
+    go straight for long, and a recorder fills in little between any two frames of its sensor.
     """
     step = max(1, log.displacement[0, ..., 0].size // NOISE.series)
     place = log.displacement.reshape(len(log), -1, 3)[:, ::step].reshape(len(log), -1)
@@ -56,7 +57,9 @@ def interpolated(log: GraspLog) -> BoolArray:
     between = np.zeros(len(log), bool)
     off = np.abs(at - (1.0 - share) * before - share * after).max(axis=1)
     between[1:-1] = (off <= NOISE.least_step) & (before != after).any(axis=1)
-    return between
+    stretches = np.diff(np.flatnonzero(~between)) - 1
+    is_filled_in = np.count_nonzero(stretches) >= stretches.max(initial=0)
+    return between if is_filled_in else np.zeros(len(log), bool)
 
 
 def noise_of_own_frames(log: GraspLog) -> dict[str, float]:

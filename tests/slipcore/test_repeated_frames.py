@@ -99,6 +99,15 @@ def test_no_frame_of_a_sensor_is_taken_for_interpolated(short_ramp: GraspLog) ->
     assert not interpolated(short_ramp.take(slice(0, 2))).any()
 
 
+def test_markers_without_noise_that_go_straight_are_not_taken_for_interpolated(short_ramp: GraspLog) -> None:
+    """As simulated ones do: what is left of them would pass for noise."""
+    share = np.interp(short_ramp.time, short_ramp.time[[0, 10, 40, -1]], [0.0, 0.1, 0.6, 1.0])
+    field = 1e-4 * (1.0 + short_ramp.position[..., :1] / 1e-2) * np.array([1.0, 0.3, -0.2])
+    straight = replace(short_ramp, displacement=share[:, None, None, None] * field, truth=None)
+    assert not interpolated(straight).any()
+    assert noise_of_own_frames(straight) == {}
+
+
 def test_what_stands_still_for_longer_than_a_recorder_waits_stays(short_ramp: GraspLog) -> None:
     source = np.sort(np.append(np.arange(len(short_ramp)), np.full(20, 30)))
     time = short_ramp.time[0] + np.arange(len(source)) / 30.0
