@@ -6,7 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -169,11 +169,16 @@ def _next(record: Mapping[str, Any]) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class CachedModel:
-    """A material as the service last gave it, with the tag of that answer and when it was asked (monotonic, s)."""
+    """A material as the service last gave it, with the tag of that answer and when it was asked (monotonic, s).
+
+    ``answers``: the models that were made of it, by the method asked for: to compare methods takes as long as a grip
+    force, and controllers ask for a model in each cycle.
+    """
 
     material: Material
     tag: str
     asked: float
+    answers: dict[str, FrictionModel] = field(default_factory=dict)
 
     @property
     def age(self) -> float:
@@ -196,11 +201,18 @@ def model(name: str, method: str, kept: dict[str, CachedModel], stale_after: flo
             if known is None:
                 raise
             warnings.warn(f"{error}; going on with the model of {name!r} from {known.age:.0f} s ago", StaleModel, 5)
-    models, because = known.material.models, known.material.because if method == "auto" else None
-    method = known.material.recommended or method if method == "auto" else method
+    if method not in known.answers:
+        known.answers[method] = _answer(known.material, method)
+    return known.answers[method]
+
+
+def _answer(material: Material, asked: str) -> FrictionModel:
+    """The material's model of the method that is ``asked`` for; raises ``NoModel``."""
+    models, because = material.models, material.because if asked == "auto" else None
+    method = material.recommended or asked if asked == "auto" else asked
     if method not in models:
         fitted = ", ".join(sorted(models)) or "none"
-        raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {fitted}")
+        raise NoModel(f"material {material.name!r} has no fitted model of method {method!r}; fitted: {fitted}")
     return _compared(method, models, because)
 
 

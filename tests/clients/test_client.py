@@ -115,6 +115,14 @@ def test_who_names_no_method_gets_the_recommended_model_or_least_squares_of_an_o
     assert (model.chosen_because, named.chosen_because) == ("bayes: best" if method == "bayes" else None, None)
 
 
+def test_models_that_are_kept_are_compared_once(service: Service, answers: SimpleNamespace) -> None:
+    server = service(answers.material)
+    with FrictionClient("http://stiction", stale_after=60.0, transport=httpx.MockTransport(server)) as client:
+        assert client.model("paper") is client.model("paper")
+        assert client.model("paper", "ols") is client.model("paper", "ols")
+    assert len(server.requests) == 1
+
+
 def test_a_model_says_that_another_of_the_same_logs_contradicts_it_and_so_does_a_grip_by_it(
     ask: Ask, service: Service, answers: SimpleNamespace
 ) -> None:
