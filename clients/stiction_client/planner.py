@@ -172,9 +172,7 @@ def required_normal_force(
     velocity = within("tangential_velocity", tangential_velocity, 0.0, 1e3, "m/s, as a magnitude")
     probability = within("slip_probability", slip_probability, *SLIP_PROBABILITIES)
     load, moment = _shares(together, tangential_load, torque, within("safety_factor", safety_factor, *SAFETY_FACTORS))
-    limit: Number = math.inf
-    if normal_force_limit is not None:
-        limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
+    limit = _limit(normal_force_limit)
     unit = together.contact.element_force(1.0, model.element_area)
 
     kind, mean_unit = _kind(model, of), unit / together.contact.pressure_square
@@ -194,6 +192,11 @@ def required_normal_force(
     if any(isinstance(each, np.ndarray) for each in given):
         return _many(question, given)
     return _one(question, asked, tangential_load, _beside(float(torque), float(safety_factor)))
+
+
+def _limit(normal_force: Number | None) -> Number:
+    """The most that object or gripper bear, N."""
+    return math.inf if normal_force is None else within("normal_force_limit", normal_force, 1e-9, LARGEST, "N")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -167,7 +167,7 @@ def kinds(
     if _implausible(model) is not None:
         return np.full(v.shape, "implausible")
     friction = np.asarray(_interval(model, v, f_n)[0])
-    beyond = ~((friction > 0.0) & (friction <= 2.0 * _most_within(model)))
+    beyond = np.logical_not(_can_be(model, friction))
     is_stale = np.full(v.shape, stale is not None or bool(model.diagnostics.get("surface_change")))
     identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
     unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
@@ -300,11 +300,9 @@ def _implausible(model: Model) -> str | None:
 
 
 def _beyond_the_law(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
-    """That no friction is what the law has at v and f_n, of a law that is plausible within its data: not above 0, or
-    over twice the most within the data, which is as far from it as 0 is.
-    """
+    """That no friction is what the law has at v and f_n, of a law that is plausible within its data."""
     friction = float(_interval(model, tangential_velocity, normal_force)[0])
-    if 0.0 < friction <= 2.0 * _most_within(model):
+    if _can_be(model, friction):
         return None
     where = f"at {tangential_velocity:.4g} m/s and {normal_force:.4g} N an element"
     much = ", over twice what it is within the data" if friction > 0.0 else ""
@@ -314,12 +312,14 @@ def _beyond_the_law(model: Model, tangential_velocity: float, normal_force: floa
     )
 
 
-def _most_within(model: Model) -> float:
-    """The greatest friction that the law has within its data, at one of whose corners it is; rest counts among them."""
+def _can_be(model: Model, friction: Number) -> bool | NDArray[np.bool_]:
+    """Where ``friction`` that the law has is above 0 and at most twice the greatest within its data, rest among them:
+    over that it is farther from what was seen than 0 is.
+    """
     b0, b1, b2 = model.coefficients.tolist()
-    return float(
-        b0 + max(0.0, b1 * model.domain.tangential_velocity[1]) + max(b2 * f for f in model.domain.normal_force)
-    )
+    most = b0 + max(0.0, b1 * model.domain.tangential_velocity[1]) + max(b2 * f for f in model.domain.normal_force)
+    can_be: bool | NDArray[np.bool_] = (friction > 0.0) & (friction <= 2.0 * most)
+    return can_be
 
 
 def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:

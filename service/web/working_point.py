@@ -28,9 +28,8 @@ class PageQuery(BaseModel):
 def shown_at(request: Request, template: str, show: Callable[[PageQuery], dict[str, Any]], **given: Any) -> Response:
     """The page at the working point that is asked for: a template with what ``show`` gives it there, and ``given``.
 
-    What its form has is in ``asked`` of the first. Where no friction can be asked for there, the
-    page at the usual point comes with the problem, so that nobody types the rest anew; raises
-    ``RequestValidationError``.
+    What its form has is in ``asked`` of the first. Where no friction can be asked for there, the page at the usual
+    point comes with the problem, so that nobody types the rest anew; raises ``RequestValidationError``.
     """
     fields = {name: text for name, text in request.query_params.items() if name in PageQuery.model_fields}
     try:

@@ -21,12 +21,12 @@ def test_intervals_of_the_quick_methods_cover_their_own_data(name: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", OWN)
 def test_95_percent_intervals_cover_93_to_97_on_their_own_data(name: str) -> None:
-    """Those of least squares cover more: they allow for errors that last in each place, of which these data have none
-    (docs/estimators.md#errors-that-last-within-a-grasp).
+    """Those of least squares cover more, of all but the slope with velocity: they allow for errors that last in each
+    place, of which these data have none (docs/estimators.md#errors-that-last-within-a-grasp).
     """
-    most = 1.0 if name in LEAST_SQUARES else 0.97 + 0.016
     row = covered(METHODS[name].own, METHODS[name].options, 1000)
     for k in range(3):  # three standard errors of 0.7 % at the edges
+        most = 1.0 if name in LEAST_SQUARES and k != 1 else 0.97 + 0.016
         assert 0.93 - 0.024 <= float(row[f"beta{k}"]) <= most, row
 
 

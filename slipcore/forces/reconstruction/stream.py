@@ -264,7 +264,7 @@ class ForceStream:
         return self._unseen(sensor.unnoticed(frame.noise), sensor.unnoticed_moment(frame.noise), frame.known)
 
     def _unknown(self, wait_for: str, known: KnownForce) -> StreamedForces:
-        """Forces that may be all that the gel bears."""
+        """Forces that may be the most that is taken for possible: the widest prior's traction on all elements."""
         most = STRENGTH.largest * self._gel.young_modulus * self._area * self._position[..., 0].size
         arm = float(np.hypot(*np.abs(self._position[..., :2]).max(axis=(0, 1))))
         return replace(self._unseen(np.full(3, most), most * arm, known), wait_for=wait_for)
