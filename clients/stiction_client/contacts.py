@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction_client.arguments import number, of_kind, of_one_shape, whole, within
-from stiction_client.elementwise import Number
+from stiction_client.elementwise import Number, hypot
 from stiction_client.errors import InvalidArgument
 
 AREAS = (1e-12, 1.0)
@@ -96,6 +96,14 @@ class Contact:
         return self.torque_arm * (
             1.0 if self.reference_force is None else (force / self.reference_force) ** (1.0 / 3.0)
         )
+
+    def as_forces(self, load: Number, torque: Number) -> tuple[Number, Number]:
+        """What it bears as tangential forces, N: one that is the same under any normal force, and the torque over its
+        arm under 1 N, where the arm grows. Without an arm no torque counts.
+        """
+        arm = self.arm(1.0)
+        twist = torque / (arm + (arm == 0.0))
+        return (load, twist) if self.power > 1 else (hypot(load, twist), 0.0)
 
     @property
     def power(self) -> int:

@@ -104,6 +104,8 @@ class LoadedContact:
 
     def _load(self, x: Number) -> tuple[Number, Number]:
         """L(x), N, and −d log L / d log x: what part of it is torque that a larger contact bears more easily."""
+        if isinstance(self.moment, float) and self.moment == 0.0:
+            return self.load, 0.0
         twist = self.moment if self.power == 1 else self.moment / x
         load = hypot(self.load, twist)
         return load, 0.0 if self.power == 1 else (twist / (load + (load == 0.0))) ** 2
@@ -130,12 +132,17 @@ class LoadedContact:
                 & (step > -x)  # friction may fall in a straight line to 0 without load: then there is no root
                 & (self.unit * x < ENDLESS)
             )
-            if not anywhere(moving):
+            if not isinstance(moving, np.ndarray):
+                if not moving:
+                    break
+                x = x + step
+            elif (left := np.count_nonzero(moving)) == 0:
                 break
-            x = x + select(moving, step, 0.0)
-            if isinstance(moving, np.ndarray) and moving.size > MANY + 2 * np.count_nonzero(moving):
-                ends = (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
-                return self._searched_on(x, ends, moving, direction)
+            else:
+                x = x + np.where(moving, step, 0.0)
+                if moving.size > MANY + 2 * left:
+                    ends = (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
+                    return self._searched_on(x, ends, moving, direction)
             value, slope = self.surplus(x)
         return x, (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
 

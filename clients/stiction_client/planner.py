@@ -289,8 +289,7 @@ def _shares(
     contact = contacts.contact
     if anywhere(contact.torque_arm == 0.0) and anywhere(turns > 0.0):
         raise InvalidArgument("torque", float(np.max(torque)), "0 where the contact has no torque_arm")
-    arm = contact.arm(1.0)
-    return load, turns / (arm + (arm == 0.0))
+    return contact.as_forces(load, turns)
 
 
 def _beside(torque: float, safety_factor: float) -> str:
@@ -384,11 +383,11 @@ def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
 def _causes(question: _Question) -> Any:
     """Why no force holds, in the order in which one would mend it (``Cause``); of no meaning where one does."""
     loaded = question.loaded
-    beyond, _, could = loaded.interval(math.inf)
-    expected, _, possible = loaded.expected().interval(math.inf)
+    beyond, could = loaded.lowest(math.inf)
+    expected, possible = loaded.expected().lowest(math.inf)
     most = loaded.root(question.limit)
     observed = question.model.domain.normal_force[1]
-    straight = replace(loaded, quantile=replace(loaded.quantile, below=0.0, above=0.0)).interval(math.inf)[2]
+    straight = replace(loaded, quantile=replace(loaded.quantile, below=0.0, above=0.0)).lowest(math.inf)[1]
     unobserved = (question.element_force(expected) > observed) | (straight & ~np.asarray(could))
     limited = (could & (beyond > most)) | (possible & (expected > most))
     return np.select([~np.asarray(possible), limited, unobserved], ["physics", "limit", "range"], "ignorance")

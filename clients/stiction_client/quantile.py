@@ -86,6 +86,8 @@ class FrictionQuantile:
 
     def _outside(self, force: Number) -> tuple[Number, Number]:
         """h and its slope."""
+        if isinstance(force, float) and self.low <= force <= self.high:
+            return 0.0, 0.0
         under: Any = (force < self.low) * self.below
         over: Any = (force > self.high) * self.above
         return over * (force - self.high) + under * (self.low - force), over - under

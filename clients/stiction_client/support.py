@@ -166,8 +166,7 @@ def kinds(
     v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
     if _implausible(model) is not None:
         return np.full(v.shape, "implausible")
-    friction = np.asarray(_interval(model, v, f_n)[0])
-    beyond = np.logical_not(_can_be(model, friction))
+    beyond = np.logical_not(_can_be(model, _expected(model, v, f_n)))
     is_stale = np.full(v.shape, stale is not None or bool(model.diagnostics.get("surface_change")))
     identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
     unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
@@ -256,10 +255,15 @@ def extrapolation(domain: Domain, tangential_velocity: float, normal_force: floa
 
 def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
     """The friction expected at v and f_n, and the half-width of its 95 % interval."""
-    b0, b1, b2 = model.coefficients.tolist()
     (c00, c01, c02), (c10, c11, c12), (c20, c21, c22) = model.covariance.tolist()
     variance = c00 + v * (c01 + c10) + v * v * c11 + f_n * (c02 + c20 + v * (c12 + c21) + f_n * c22)
-    return b0 + v * b1 + f_n * b2, plain(special().stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
+    return _expected(model, v, f_n), plain(special().stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
+
+
+def _expected(model: Model, v: Number, f_n: Number) -> Number:
+    b0, b1, b2 = model.coefficients.tolist()
+    expected: Number = b0 + v * b1 + f_n * b2
+    return expected
 
 
 def _knows_no_velocity(model: Model) -> bool:
@@ -301,7 +305,7 @@ def _implausible(model: Model) -> str | None:
 
 def _beyond_the_law(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
     """That no friction is what the law has at v and f_n, of a law that is plausible within its data."""
-    friction = float(_interval(model, tangential_velocity, normal_force)[0])
+    friction = float(_expected(model, tangential_velocity, normal_force))
     if _can_be(model, friction):
         return None
     where = f"at {tangential_velocity:.4g} m/s and {normal_force:.4g} N an element"
@@ -317,7 +321,8 @@ def _can_be(model: Model, friction: Number) -> bool | NDArray[np.bool_]:
     over that it is farther from what was seen than 0 is.
     """
     b0, b1, b2 = model.coefficients.tolist()
-    most = b0 + max(0.0, b1 * model.domain.tangential_velocity[1]) + max(b2 * f for f in model.domain.normal_force)
+    low, high = model.domain.normal_force
+    most = b0 + max(0.0, b1 * model.domain.tangential_velocity[1]) + max(b2 * low, b2 * high)
     can_be: bool | NDArray[np.bool_] = (friction > 0.0) & (friction <= 2.0 * most)
     return can_be
 

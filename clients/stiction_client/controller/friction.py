@@ -58,9 +58,8 @@ class KnownFriction:
 
     def required(self, tangential: float, torque: float, most: float) -> float:
         """Least normal force, N, that holds the load; infinite where none up to ``most`` N does."""
-        power = self.contact.power
-        factor = self.sharpened
-        loaded = LoadedContact(self.quantile, tangential / factor, self._twist(torque) / factor, self.unit, power)
+        load, moment = self.contact.as_forces(tangential / self.sharpened, torque / self.sharpened)
+        loaded = LoadedContact(self.quantile, load, moment, self.unit, self.contact.power)
         least, holds = loaded.lowest(loaded.root(most))
         return float(loaded.force(least)) if holds else math.inf
 
@@ -133,9 +132,6 @@ class KnownFriction:
     def _low_and_mean(self, force: float) -> tuple[float, float]:
         element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
         return float(self.quantile(element)[0]), float(self.quantile.mean(element))
-
-    def _twist(self, torque: float) -> float:
-        return torque / float(self.contact.arm(1.0)) if torque > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
