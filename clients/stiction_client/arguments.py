@@ -6,6 +6,7 @@ from types import NoneType, UnionType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction_client.elementwise import Number
 from stiction_client.errors import InvalidArgument
@@ -21,7 +22,7 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
         if low <= number <= high:
             return number
         raise InvalidArgument(name, value, _range(low, high, unit))
-    array = np.asarray(value)
+    array = _array(name, value)
     if array.dtype.kind not in "iuf" or _holds_truth(value) or np.ma.is_masked(value):
         raise InvalidArgument(name, shown(value), f"numbers: {_range(low, high, unit)}")
     numbers = array.astype(np.float64)
@@ -49,7 +50,7 @@ def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
 
 def of_one_shape(**given: object) -> None:
     """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
-    shapes = {name: np.shape(value) for name, value in given.items() if not isinstance(value, ONE)}  # type: ignore[call-overload]
+    shapes = {name: _array(name, value).shape for name, value in given.items() if not isinstance(value, ONE)}
     if not shapes:
         return
     try:
@@ -91,6 +92,14 @@ def for_json(name: str, value: object) -> Any:
     if value is None or isinstance(value, str | int | float):
         return value
     raise InvalidArgument(name, shown(value), "numbers, text, and lists and objects of these")
+
+
+def _array(name: str, value: object) -> NDArray[Any]:
+    """``value`` as an array of whatever it holds; raises ``InvalidArgument`` for lists of unequal lengths in a list."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        raise InvalidArgument(name, shown(value), "one number, or an array of them") from None
 
 
 def _holds_truth(value: object) -> bool:

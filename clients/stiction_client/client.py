@@ -577,10 +577,9 @@ def _stale_after(seconds: float) -> float:
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
     key = os.environ.get("STICTION_KEY") if key is None else key
     url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
-    if key and not (key.isascii() and key.isprintable()):  # it is not shown
-        raise InvalidArgument(
-            "key", "one with other characters", "printable ASCII, as `stiction keys create` prints it"
-        )
+    if key and not (isinstance(key, str) and key.isascii() and key.isprintable()):  # it is not shown
+        what = "one with other characters" if isinstance(key, str) else f"of type {type(key).__name__}"
+        raise InvalidArgument("key", what, "printable ASCII, as `stiction keys create` prints it")
     timeout = float(within("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s"))
     return {
         "base_url": service_address(url),

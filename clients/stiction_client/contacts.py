@@ -65,15 +65,17 @@ class Contact:
 
     @classmethod
     def measured(cls, pressure: Number, x: Number, y: Number, element_area: float) -> "Contact":
-        """A contact as a sensor sees it: ``pressure`` [k] Pa of elements of ``element_area`` m² at ``x``, ``y`` [k] m.
+        """A contact as a sensor sees it: ``pressure`` Pa of elements of ``element_area`` m² at ``x``, ``y`` m, three
+        arrays of one shape, such as [rows, columns].
 
         Its area is that of the elements under pressure and stays so at any force.
         """
-        p = np.atleast_1d(within("pressure", pressure, 0.0, 1e12, "Pa"))
-        places = [np.atleast_1d(within(name, place, -1.0, 1.0, "m")) for name, place in (("x", x), ("y", y))]
-        if any(place.shape != p.shape for place in places) or p.ndim != 1:
+        p = np.asarray(within("pressure", pressure, 0.0, 1e12, "Pa"))
+        places = [np.asarray(within(name, place, -1.0, 1.0, "m")) for name, place in (("x", x), ("y", y))]
+        if any(place.shape != p.shape for place in places):
             sizes = " and ".join(str(list(each.shape)) for each in (p, *places))
-            raise InvalidArgument("pressure, x and y", f"{sizes} numbers", "three rows of one length")
+            raise InvalidArgument("pressure, x and y", f"{sizes} numbers", "three arrays of one shape")
+        p, places = p.ravel(), [place.ravel() for place in places]
         element = number("element_area", element_area, *AREAS, "m²")
         within("total pressure", float(p.sum()), 1e-300, 1e300, "Pa, above 0")
         p = p / p.max()  # whose squares then cannot underflow

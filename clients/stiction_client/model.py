@@ -133,8 +133,11 @@ class FrictionModel(LinearFriction):
         content = json.dumps({"format": FILE_FORMAT, "version": FILE_VERSION, "model": self.to_json()}, indent=1)
         target = Path(path)
         beside = target.with_name(f"{target.name}.{os.getpid()}.part")
-        beside.write_text(content, encoding="utf-8")
-        beside.replace(target)
+        try:
+            beside.write_text(content, encoding="utf-8")
+            beside.replace(target)
+        finally:  # of what could not be put in place nothing stays
+            beside.unlink(missing_ok=True)
 
     @classmethod
     def load(cls, path: Path | str) -> "FrictionModel":

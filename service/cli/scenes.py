@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 COLUMNS = ("geoms", "written μ", "by", "holds μ", "at 95 % it", "pressed with", "bears now", "creeps now")
 
+LEAST_SHOWN = 1e-6
+"""N, or mm/s, below which a table of a scene shows 0."""
+
 
 def check_scene(
     model: Annotated[Path, typer.Argument(help="A MuJoCo scene (MJCF) in which something is gripped.")],
@@ -29,7 +32,9 @@ def check_scene(
     if json:
         print_json({"scene": model.name, **asdict(check)})
         return
-    title = f"{model.name} after {check.seconds:g} s: {len(check.pairs)} pairs of geoms touch"
+    count = len(check.pairs)
+    touch = "1 pair of geoms touches" if count == 1 else f"{count} pairs of geoms touch"
+    title = f"{model.name} after {check.seconds:g} s: {touch}"
     print_table(title, COLUMNS, [_row(pair) for pair in check.pairs])
     for pair in check.pairs:
         typer.echo(printable(f"{_named(pair)}: {pair.explanation}"))
@@ -53,9 +58,14 @@ def _row(pair: "PairCheck") -> list[str]:
     from stiction_client.mujoco_scene.advice import speed
 
     holds = number(pair.held.friction) if math.isfinite(pair.held.friction) else "all that was tried"
-    forces = [f"{number(force)} N" for force in (pair.normal_force, pair.tangential_force)]
-    now = f"{number(1e3 * pair.speed)} mm/s"
+    forces = [f"{_noiseless(force)} N" for force in (pair.normal_force, pair.tangential_force)]
+    now = f"{_noiseless(1e3 * pair.speed)} mm/s"
     return [_named(pair), number(pair.friction), pair.rule, holds, speed(pair.held), *forces, now]
+
+
+def _noiseless(value: float) -> str:
+    """A force, N, or speed, mm/s, without the digits that a solver's rounding leaves of nothing."""
+    return number(value if abs(value) >= LEAST_SHOWN else 0.0)
 
 
 def _named(pair: "PairCheck") -> str:

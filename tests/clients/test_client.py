@@ -590,6 +590,11 @@ def test_a_key_that_no_header_can_hold_is_refused_and_not_shown(client: Callable
     assert key not in str(refused.value)
 
 
+def test_a_key_that_is_no_text_is_named_by_its_type() -> None:
+    with pytest.raises(InvalidArgument, match="key is of type int; allowed: printable ASCII"):
+        FrictionClient("http://stiction", 3)  # type: ignore[arg-type]
+
+
 def test_url_and_key_are_those_of_the_environment(
     answers: SimpleNamespace, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:

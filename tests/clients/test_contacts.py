@@ -224,7 +224,9 @@ def test_as_many_grasps_slip_under_load_and_torque_as_were_allowed(make_model: M
     assert abs(slips - probability) < 4.0 * math.sqrt(probability * (1.0 - probability) / draws)
 
 
-@pytest.mark.parametrize("wrong", [True, None, "1.5", 1 + 2j, [True, False], float("nan"), -1.0, 1e300, 10**400])
+@pytest.mark.parametrize(
+    "wrong", [True, None, "1.5", 1 + 2j, [True, False], [[1.0, 2.0], [3.0]], float("nan"), -1.0, 1e300, 10**400]
+)
 @pytest.mark.parametrize("name", ["tangential_load", "torque", "contact_area", "tangential_velocity", "safety_factor"])
 def test_what_is_no_number_in_range_is_refused_by_name(make_model: Make, name: str, wrong: Any) -> None:
     arguments = {"tangential_load": 1.0, "contact_area": AREA} | {name: wrong}
@@ -281,6 +283,7 @@ def test_only_a_model_is_taken_for_one(model: Any) -> None:
     ("x", "y", "message"),
     [
         ([0.0], [0.0, 1e-3], r"pressure, x and y is \[2\] and \[1\] and \[2\] numbers"),
+        ([[0.0, 1e-3]], [[0.0, 1e-3]], r"pressure, x and y is \[2\] and \[1, 2\] and \[1, 2\] numbers"),
         ([0.0, "a"], [0.0, 1e-3], "^x is "),
         ([0.0, 1e-3], [0.0, np.nan], "^y is nan; allowed: -1 to 1 m"),
     ],
@@ -323,6 +326,14 @@ def test_lever_arms_of_another_length_are_named(make_model: Make) -> None:
     lids = n_fingers(3, Contact.flat(AREA), np.array([0.02, 0.03]))
     with pytest.raises(InvalidArgument, match=r"^tangential_load and object_radius is \[3\] and \[2\]"):
         required_normal_force(make_model(), np.ones(3), contacts=lids)
+
+
+def test_a_measured_pressure_may_be_a_map_of_the_sensor() -> None:
+    x, y = np.meshgrid(np.linspace(-2e-3, 2e-3, 5), np.linspace(-1e-3, 1e-3, 3))
+    pressure = np.maximum(1.0 - (x**2 + y**2) / 4e-6, 0.0)
+    mapped = Contact.measured(pressure, x, y, 1e-6)
+    assert mapped == Contact.measured(pressure.ravel(), x.ravel(), y.ravel(), 1e-6)
+    assert mapped.area == pytest.approx(np.count_nonzero(pressure) * 1e-6)
 
 
 def test_a_measured_pressure_counts_by_its_shape_alone() -> None:

@@ -202,6 +202,13 @@ def test_a_saved_model_comes_back_to_the_last_bit(make_model: Make, tmp_path: Pa
     assert [path.name for path in tmp_path.iterdir()] == ["paper.json"]
 
 
+def test_of_a_model_that_cannot_be_put_in_place_nothing_stays(make_model: Make, tmp_path: Path) -> None:
+    (tmp_path / "paper.json").mkdir()
+    with pytest.raises(IsADirectoryError):
+        make_model().save(tmp_path / "paper.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["paper.json"]
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

@@ -1,6 +1,8 @@
 """Check a scene: load it, let it come to rest, and measure each pair of geoms that touches."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,7 +66,12 @@ def check_scene(
     """
     span = float(within("seconds", seconds, LOOKED_AT, 1000.0, "s"))
     wanted = None if friction is None else float(within("friction", friction, 1e-5, 100.0))
-    model = _load(Path(path))
+    with _silent():
+        return _check(Path(path), keyframe, span, wanted)
+
+
+def _check(path: Path, keyframe: str | None, span: float, wanted: float | None) -> SceneCheck:
+    model = _load(path)
     data = _start(model, keyframe)
     steps = math.ceil(LOOKED_AT / model.opt.timestep)
     mujoco.mj_step(model, data, max(math.ceil(span / model.opt.timestep) - steps, 0))
@@ -75,6 +82,17 @@ def check_scene(
         allowed = "geoms that press on each other: name a keyframe in which the gripper is closed, or give it more time"
         raise InvalidArgument(f"what touches after {span:g} s", "nothing", allowed)
     return _checked(model, data, found, span, wanted)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without MuJoCo's warnings, of which it writes one a step to the terminal and into a file where the user is."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _checked(model: Any, data: Any, found: list[Touch], seconds: float, wanted: float | None) -> SceneCheck:

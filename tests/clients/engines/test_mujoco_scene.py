@@ -254,7 +254,9 @@ def test_a_file_that_mujoco_refuses_is_named(tmp_path: Path) -> None:
         check_scene(tmp_path / "no.xml")
 
 
-def test_a_scene_that_diverges_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_that_diverges_is_named_once_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "stiff.xml").write_text(
         """<mujoco><option timestep=".05"/><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .1">
@@ -263,6 +265,9 @@ def test_a_scene_that_diverges_is_named(tmp_path: Path, monkeypatch: pytest.Monk
     )
     with pytest.raises(InvalidArgument, match="the scene is unstable"):
         check_scene(tmp_path / "stiff.xml")
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["stiff.xml"]
+    assert mujoco.get_mju_user_warning() is None
 
 
 def test_the_command_prints_a_table_with_advice(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:

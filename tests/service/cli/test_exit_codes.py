@@ -80,6 +80,7 @@ def test_what_is_said_of_an_error_is_its_text_and_its_notes_line_by_line() -> No
     ("error", "told"),
     [
         (InvalidArgument("tangential_load", -1.0, "0 or more"), "--load is -1.0; allowed: 0 or more"),
+        (InvalidArgument("slip_probability", 0, "1e-12 to 0.5"), "--slip-probability is 0; allowed: 1e-12 to 0.5"),
         (InvalidArgument("at_force", 0.0, "above 0"), "--round-at is 0.0; allowed: above 0"),
         (InvalidArgument("of", "x", "element or contact"), "of is x; allowed: element or contact"),
         (

@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,17 @@ def test_pairs_are_told_in_newtons_and_millimetres_with_what_to_change(
     assert " ".join(first.split()) == "pad – cup�[2J 0.500 max 0.450 creeps 0.5 mm/s 8.00 N 0.250 N 2.00 mm/s"
     assert " ".join(second.split()) == "a – b 1.00 pair all that was tried slips 1.00 N 0 N 0 mm/s"
     assert others == ["pad – cup�[2J: the larger of both", "  do this", "a – b: the pair", "not measured: a plane�"]
+
+
+def test_what_rounding_leaves_of_nothing_is_shown_as_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    still = replace(FREE, tangential_force=2e-17, speed=1e-19)
+    monkeypatch.setattr(mujoco_scene, "check_scene", lambda *_, **__: SceneCheck(1.0, (still,), ()))
+    scenes.check_scene(Path("grasp.xml"))
+    title, _, _, row, *_ = capsys.readouterr().out.splitlines()
+    assert title == "grasp.xml after 1 s: 1 pair of geoms touches"
+    assert " ".join(row.split()) == "a – b 1.00 pair all that was tried slips 1.00 N 0 N 0 mm/s"
 
 
 def test_a_program_is_told_the_name_and_all_that_was_measured(
