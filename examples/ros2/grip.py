@@ -28,8 +28,7 @@ def settings_of(parameters: Mapping[str, float]) -> ControlSettings:
     given = {name: parameters[name] for name in gains() if name in parameters}
     area, force = parameters["contact_area"], parameters.get("round_at", 0.0)
     contact = Contact.flat(area) if force == 0.0 else Contact.round(area, force)
-    counted = {name: int(value) if gains()[name].unit == "frames" else value for name, value in given.items()}
-    return ControlSettings(contact=contact, **counted)
+    return ControlSettings(contact=contact, **given)
 
 
 def samples_of(told: Sequence[float]) -> SlipSamples | None:

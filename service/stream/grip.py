@@ -11,7 +11,7 @@ from slipcore import Frame, InvalidInput, SlipState
 from slipcore.frames import FloatArray
 from stiction_client import Contact, ControlSettings, FrictionModel, GraspController, InvalidArgument
 from stiction_client.arguments import within
-from stiction_client.controller import Gain, gains
+from stiction_client.controller import gains
 
 CONTACT_RANGES = {"pressure_square": (0.1, 1e6, "-"), "torque_arm": (1e-9, 1.0, "m")}
 
@@ -59,17 +59,7 @@ def settings_of(control: Control) -> ControlSettings:
         raise InvalidArgument("settings", name, ", ".join(known))
     for name in missing:
         raise InvalidArgument(name, "not given", f"{known[name].low:g} to {known[name].high:g} {known[name].unit}")
-    given = {name: _value(name, value, known[name]) for name, value in control.settings.items()}
-    return ControlSettings(contact=_contact(control), **given)
-
-
-def _value(name: str, value: float, gain: Gain) -> Any:
-    """A setting, as an integer where it counts frames."""
-    if gain.unit != "frames":
-        return value
-    if not float(value).is_integer():
-        raise InvalidArgument(name, value, "a whole number of frames")
-    return int(value)
+    return ControlSettings(contact=_contact(control), **control.settings)  # type: ignore[arg-type]  # frames are counted
 
 
 def _contact(control: Control) -> Contact:

@@ -503,6 +503,8 @@ def test_torque_on_a_contact_without_an_arm_is_refused() -> None:
         ({"most_force": 0.5}, "least_force"),
         ({"learn_stick_ratio": 0.6}, "learn_stick_ratio"),
         ({"fall_rate": np.ones(2)}, "fall_rate"),
+        ({"learn_frames": 2.5}, "learn_frames"),
+        ({"reflex_frames": 0}, "reflex_frames"),
         ({"contact": 6e-5}, "contact"),
     ],
 )
@@ -510,6 +512,11 @@ def test_a_setting_outside_of_its_range_is_refused_by_name(wrong: dict[str, Any]
     with pytest.raises(InvalidArgument) as refusal:
         dataclasses.replace(SETTINGS, **wrong)
     assert refusal.value.name == name
+
+
+def test_frames_are_counted_in_whole_numbers_however_they_are_given() -> None:
+    settings = dataclasses.replace(SETTINGS, learn_frames=8.0, reflex_frames=np.int64(3))  # type: ignore[arg-type]
+    assert [(type(each), each) for each in (settings.learn_frames, settings.reflex_frames)] == [(int, 8), (int, 3)]
 
 
 def test_a_setting_without_effect_is_taken_with_a_warning() -> None:

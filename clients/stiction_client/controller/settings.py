@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple, get_type_hints
 
 import numpy as np
 
-from stiction_client.arguments import of_kind, shown, within
+from stiction_client.arguments import number, of_kind, shown, whole
 from stiction_client.contacts import Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.planner import SLIP_PROBABILITIES, SLIP_PROBABILITY
@@ -20,6 +20,9 @@ class Gain(NamedTuple):
     unit: str
     reason: str
 
+
+FRAMES = "frames"
+"""The unit of what is counted, so that it is whole."""
 
 WITHOUT_EFFECT = 0.05
 """``contradiction_share``, until it goes."""
@@ -73,12 +76,10 @@ class ControlSettings:
     reflex_gain: Annotated[
         float, Gain(0.0, 5.0, "-", "on top of the measured force: twice of it after two lags of a gripper")
     ] = 0.5
-    reflex_frames: Annotated[int, Gain(1, 100, "frames", "a frame's error alone does not start it; 17 ms more")] = 2
+    reflex_frames: Annotated[int, Gain(1, 100, FRAMES, "a frame's error alone does not start it; 17 ms more")] = 2
     settle_time: Annotated[float, Gain(0.0, 10.0, "s", "several lags of a gripper")] = 0.2
     steady_share: Annotated[float, Gain(0.0, 1.0, "-", "load may change by that much within the lead")] = 0.05
-    learn_frames: Annotated[
-        int, Gain(2, 1000, "frames", "spread among fewer frames is not known to half of itself")
-    ] = 8
+    learn_frames: Annotated[int, Gain(2, 1000, FRAMES, "spread among fewer frames is not known to half of itself")] = 8
     learn_spread: Annotated[
         float, Gain(0.0, 0.3, "-", "relative; frames in which little slips scatter by more, and agree by chance")
     ] = 0.06
@@ -92,16 +93,14 @@ class ControlSettings:
         float,
         Gain(0.0, 10.0, "s", "how long slip of a load is waited for, and samples add up"),
     ] = 1.0
-    recognise_frames: Annotated[int, Gain(1, 100, "frames", "the first ones have few elements, and the same ones")] = 5
+    recognise_frames: Annotated[int, Gain(1, 100, FRAMES, "the first ones have few elements, and the same ones")] = 5
     recognise_probability: Annotated[
         float, Gain(0.5, 1.0, "-", "one in ten may be wrong: its own samples sharpen or refute it")
     ] = 0.9
     contradiction_deviations: Annotated[
         float, Gain(0.5, 10.0, "-", "of both errors: of 700 right models one is doubted for its samples")
     ] = 3.0
-    contradiction_frames: Annotated[
-        int, Gain(1, 100, "frames", "50 ms at 60 frames/s; one frame is wrong too often")
-    ] = 3
+    contradiction_frames: Annotated[int, Gain(1, 100, FRAMES, "50 ms at 60 frames/s; one frame is wrong too often")] = 3
     contradiction_share: Annotated[
         float, Gain(0.0, 1.0, "-", "has no effect any more: samples count together, by their elements")
     ] = WITHOUT_EFFECT
@@ -123,9 +122,11 @@ class ControlSettings:
         if any(isinstance(each, np.ndarray) for each in (self.contact.area, self.contact.pressure_square)):
             raise InvalidArgument("contact", shown(self.contact), "one contact, of one area")
         for name, gain in gains().items():
-            value = getattr(self, name)
-            if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):
-                raise InvalidArgument(name, "an array", "one number")
+            if gain.unit == FRAMES:  # 8.0 is 8, by which frames are counted off
+                count = whole(name, getattr(self, name), int(gain.low), int(gain.high), gain.unit)
+                object.__setattr__(self, name, count)
+            else:
+                number(name, getattr(self, name), gain.low, gain.high, gain.unit.removeprefix("-"))
         if self.touch_force >= self.most_force:
             raise InvalidArgument("touch_force", self.touch_force, f"less than most_force, {self.most_force:g} N")
         if self.least_force >= self.most_force:
