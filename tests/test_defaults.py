@@ -147,6 +147,7 @@ CLIENT_OTHER = {
     "controller/settings.py": "the gains, each with its range, unit and reason",
     "defaults.py": "the table",
     "controller/records.py": "permitted ranges",
+    "elementwise.py": "how many quantiles are remembered, which changes no answer",
     "holding.py": "from how many entries on arrays shrink, and what is next to 0, which change no answer",
     "model.py": "the file format's name and version",
     "json_values.py": "rounding that a model may have when it is read, which changes no answer",

@@ -66,8 +66,9 @@ class LoadedContact:
         bounded = (end > 0.0) & (end < math.inf)
         if anywhere(bounded):
             high = select(bounded, self._search(select(bounded, end, 1.0), -1)[0], end)
-        rests = (self.load + self.moment == 0.0) & (self.quantile(0.0)[0] <= 0.0)  # and no force but 0 is sure to hold
-        high = select(rests, 0.0, high)
+        rests = self.load + self.moment == 0.0
+        if anywhere(rests):  # where no friction is sure, no force but 0 is sure to hold
+            high = select(rests & (self.quantile(0.0)[0] <= 0.0), 0.0, high)
         return low, select(high > low, high, low), holds
 
     def best(self, most: float) -> float:

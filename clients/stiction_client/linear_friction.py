@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
 from stiction_client.arguments import shown
-from stiction_client.elementwise import FloatArray, Number, special
+from stiction_client.elementwise import FloatArray, Number, special, student_quantile
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import (
     ONLY_SENSOR,
@@ -54,7 +54,7 @@ class Scale:
 
     def quantile(self, level: Number) -> Number:
         """Quantile of one draw, in the shape of ``level``."""
-        return cast(Number, self.value * special().stdtrit(self.degrees_of_freedom, level))
+        return self.value * student_quantile(self.degrees_of_freedom, level)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +195,7 @@ class LinearFriction:
     def interval(self, level: float = 0.95) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]."""
         self._check_probability("level", level)
-        half = special().stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
+        half = student_quantile(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
 
     def scale_interval(self, level: float = 0.95) -> tuple[float, float]:
@@ -239,8 +239,8 @@ class LinearFriction:
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
         shared, own = self.scatter(quantile, count)
         scatter = np.hypot(shared * mean, own)
-        uncertain = special().stdtrit(self.degrees_of_freedom, quantile) * error
-        distance = np.hypot(np.hypot(scatter, uncertain), special().ndtri(quantile) * widening(self, v, f_n))
+        uncertain = student_quantile(self.degrees_of_freedom, quantile) * error
+        distance = np.hypot(np.hypot(scatter, uncertain), student_quantile(math.inf, quantile) * widening(self, v, f_n))
         return np.asarray(np.maximum(mean + np.sign(quantile - 0.5) * distance, 0.0))
 
     def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
@@ -249,7 +249,7 @@ class LinearFriction:
         The two add as root of squares. Shapes broadcast.
         """
         if self.scales is None:
-            return 0.0, cast(Number, special().stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
+            return 0.0, student_quantile(self.scatter_degrees_of_freedom, quantile) * self.scale
         place, within = self.scales.between_places.quantile(quantile), self.scales.within.quantile(quantile)
         own = ((place * place + within * within) / elements) ** 0.5
         shared, sensors = self.scales.between_grasps.quantile(quantile), self.scales.between_sensors

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stiction_client.elementwise import Number, hypot, of_these, plain, select, special
+from stiction_client.elementwise import Number, hypot, of_these, select, student_quantile
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FrictionModel
 from stiction_client.support import beyond_velocity, extrapolation_scale
@@ -54,8 +54,8 @@ class FrictionQuantile:
         cls, model: FrictionModel, tangential_velocity: Number, probability: Number
     ) -> Callable[[Number], "FrictionQuantile"]:
         """``of`` as a function of the number of elements alone, on which little of it depends."""
-        shared, own = (plain(part) for part in model.scatter(probability))
-        error = plain(-special().stdtrit(model.degrees_of_freedom, probability))
+        shared, own = model.scatter(probability)
+        error = -student_quantile(model.degrees_of_freedom, probability)
         b0, b1, b2 = coefficients = model.coefficients.tolist()
         covariance = model.covariance.tolist()
         if not (all(map(math.isfinite, chain(coefficients, *covariance))) and _finite(shared, own, error)):
@@ -67,7 +67,7 @@ class FrictionQuantile:
         k, g = error * (along + v * along_v), error * growth
         if model.scales is not None:
             s, k, g = _joined(s, k, g, shared * level, shared * b2)
-        each = -plain(special().ndtri(probability)) * extrapolation_scale(model)
+        each = -student_quantile(math.inf, probability) * extrapolation_scale(model)
         low, high = model.domain.normal_force
         below, above = (each / bound if bound > 0.0 else 0.0 * each for bound in (low, high))
         s = hypot(s, each * beyond_velocity(model.domain, v))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.defaults import BEND, UNCERTAIN
-from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, plain, root, select, special
+from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, root, select, student_quantile
 
 Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
 
@@ -257,7 +257,7 @@ def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
     """The friction expected at v and f_n, and the half-width of its 95 % interval."""
     (c00, c01, c02), (c10, c11, c12), (c20, c21, c22) = model.covariance.tolist()
     variance = c00 + v * (c01 + c10) + v * v * c11 + f_n * (c02 + c20 + v * (c12 + c21) + f_n * c22)
-    return _expected(model, v, f_n), plain(special().stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
+    return _expected(model, v, f_n), student_quantile(model.degrees_of_freedom, 0.975) * root(variance)
 
 
 def _expected(model: Model, v: Number, f_n: Number) -> Number:
@@ -330,7 +330,7 @@ def _can_be(model: Model, friction: Number) -> bool | NDArray[np.bool_]:
 def _uncertainty_outside(model: Model, tangential_velocity: float, normal_force: float) -> float:
     """``uncertainty`` where the law may bend, too."""
     expected, half = map(float, _interval(model, tangential_velocity, normal_force))
-    bend = float(special().ndtri(0.975)) * float(widening(model, tangential_velocity, normal_force))
+    bend = float(student_quantile(math.inf, 0.975)) * float(widening(model, tangential_velocity, normal_force))
     return math.hypot(half, bend) / expected
 
 

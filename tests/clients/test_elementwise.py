@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import t as student_t
 
 from stiction_client import elementwise as each
 
@@ -46,7 +47,11 @@ def test_something_holds_anywhere() -> None:
     assert not each.anywhere(np.array([False, False]))
 
 
-def test_one_number_is_a_float() -> None:
-    assert type(each.plain(np.float64(2.0))) is type(each.plain(np.array(2.0))) is float
-    many = np.array([1.0, 2.0])
-    assert each.plain(many) is many
+def test_students_quantile_is_a_float_of_one_level_and_an_array_of_many() -> None:
+    for degrees in (3.0, 12.5, math.inf):
+        one = each.student_quantile(degrees, 0.01)
+        assert type(one) is type(each.student_quantile(degrees, np.float64(0.01))) is float
+        assert one == pytest.approx(student_t.ppf(0.01, degrees), rel=1e-12)
+        many = np.asarray(each.student_quantile(degrees, np.array([[0.01], [0.3]])))
+        assert many == pytest.approx(student_t.ppf([[0.01], [0.3]], degrees), rel=1e-12)
+    assert each.student_quantile(3.0, 0.02) != each.student_quantile(4.0, 0.02)

@@ -7,7 +7,6 @@ import pytest
 
 from stiction_client import json_values
 from stiction_client.arguments import within
-from stiction_client.elementwise import anywhere, greatest, hypot, least, logarithm, plain, root, select
 from stiction_client.errors import InvalidArgument
 
 
@@ -120,25 +119,3 @@ def test_what_is_out_of_range_or_no_number_is_named(value: object, told: str) ->
     with pytest.raises(InvalidArgument) as refusal:
         within("load", value, 1.0, 2.0, "N")
     assert str(refusal.value) == told
-
-
-def test_floats_and_arrays_meet_the_same_formulas() -> None:
-    one, other = np.array([1.0, 4.0, -1.0]), np.array([2.0, 3.0, -1.0])
-    for formula in (least, greatest, hypot, lambda a, b: select(a > b, a, b), lambda a, b: root(a * b + b)):
-        each = [formula(float(a), float(b)) for a, b in zip(one, other, strict=True)]
-        np.testing.assert_allclose(formula(one, other), each, rtol=1e-15)
-        assert all(isinstance(value, float) for value in each)
-    assert (least(1.0, 2.0), greatest(1.0, 2.0), hypot(3.0, 4.0)) == (1.0, 2.0, 5.0)
-    np.testing.assert_array_equal(hypot(3.0, np.array([4.0])), [5.0])
-    assert (root(-1e-20), root(4.0), logarithm(math.e)) == (0.0, 2.0, 1.0)
-    np.testing.assert_array_equal(logarithm(np.array([1.0])), [0.0])
-
-
-def test_anything_of_an_array_or_a_float_alone_tells_whether_it_holds() -> None:
-    assert anywhere(np.array([False, True]))
-    assert not anywhere(np.array([False, False]))
-    assert anywhere(1.0 > 0.0)
-    assert isinstance(plain(np.float64(3.0)), float)
-    assert plain(np.array(3.0)) == 3.0
-    assert not isinstance(plain(np.array(3.0)), np.ndarray)
-    assert isinstance(plain(np.array([3.0])), np.ndarray)
