@@ -103,6 +103,10 @@ class World:
     force_noise: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("friction", "pressure"):
+            given = getattr(self, name)
+            if not isinstance(given, np.ndarray) and (name, given) != ("pressure", None):
+                raise InvalidInput(name, repr(given)[:60], "an array, of a value at each of the sensor's points")
         shape = self.friction.shape
         if len(shape) != 3 or shape[0] not in (1, 2) or shape[1:] != self.sampling.points:
             raise InvalidInput("friction", f"of shape {list(shape)}", f"[1 or 2 fingers, {self.sampling.points}]")

@@ -2,7 +2,9 @@
 
 import math
 import re
+from typing import Any
 
+import numpy as np
 import pytest
 
 from slipcore.contact.reference.checks import check_range
@@ -34,10 +36,15 @@ def test_a_value_within_its_bounds_is_given_back(value: float, bounds: dict[str,
         (math.inf, {"above": 0.0}, "m", "load is inf m; allowed: above 0 m"),
         (math.nan, {"at_most": 1.0}, "m", "load is nan m; allowed: at most 1 m"),
         (-math.inf, {"at_most": 1.0}, "", "load is -inf; allowed: at most 1"),
+        (np.float32(-2.0), {"above": 0.0}, "N", "load is -2 N; allowed: above 0 N"),
+        (None, {"above": 0.0}, "N", "load is None; allowed: above 0 N"),
+        ("1", {"above": 0.0}, "N", "load is '1'; allowed: above 0 N"),
+        (True, {"above": 0.0}, "N", "load is True; allowed: above 0 N"),
+        (np.ones(2), {}, "N", "load is array([1., 1.]); allowed: a finite number of N"),
     ],
 )
 def test_a_value_beyond_them_is_refused_with_its_unit(
-    value: float, bounds: dict[str, float], unit: str, told: str
+    value: Any, bounds: dict[str, float], unit: str, told: str
 ) -> None:
     with pytest.raises(InvalidInput, match=re.escape(told) + "$"):
         check_range("load", value, unit=unit, **bounds)
