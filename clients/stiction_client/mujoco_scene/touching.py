@@ -1,6 +1,7 @@
 """The pairs of geoms that press on each other in a scene that has come to rest."""
 
 from collections import defaultdict
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -51,7 +52,8 @@ class _Sum:
         wrench = np.zeros(6)
         mujoco.mj_contactForce(model, data, index, wrench)
         weight = abs(wrench[0])
-        self.contact = contact
+        if self.contact is None:
+            self.contact = copy(contact)  # what the engine gives is of this step alone: the next one writes over it
         self.force += wrench[:3] @ frame
         self.normal += weight * frame[0]
         self.velocity += weight * _relative_velocity(model, data, contact)

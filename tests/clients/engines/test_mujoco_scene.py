@@ -162,6 +162,18 @@ def test_between_the_edges_of_a_pyramid_less_is_held(scene: Scene) -> None:
     assert pair.held.friction == pytest.approx(math.sqrt(0.5), rel=0.05)
 
 
+def test_a_pair_that_parts_before_the_end_keeps_the_friction_it_had(tmp_path: Path) -> None:
+    """The engine writes the contacts of a step over those of the one before."""
+    (tmp_path / "bounces.xml").write_text(
+        """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1" friction=".1 .005 .0001"/>
+        <body pos="0 0 .08"><freejoint/><geom name="bounces" size=".05" friction=".9 .005 .0001" solref="-20000 -1"/>
+        </body><body pos=".5 0 .0499"><freejoint/><geom name="rests" size=".05" friction=".3 .005 .0001"/></body>
+        </worldbody></mujoco>"""
+    )
+    found = check_scene(tmp_path / "bounces.xml", seconds=0.14).pairs
+    assert {pair.geoms: pair.friction for pair in found} == {("floor", "bounces"): 0.9, ("floor", "rests"): 0.3}
+
+
 def test_adhesion_adds_to_what_is_held(scene: Scene) -> None:
     adhesive = pairs(".5 .5").replace("/>", ' adhesion="0.5"/>')
     pair, _ = checked(scene(contact=adhesive))
