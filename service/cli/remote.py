@@ -200,8 +200,8 @@ def plan(
         elements=elements,
     )
     if json:
-        chosen = {"method": model.method, "version": model.version, "chosen_because": because}
-        print_json(chosen | asdict(answer))
+        chosen = {"material": model.material, "method": model.method, "version": model.version}
+        print_json(chosen | {"chosen_because": because} | asdict(answer))
     else:
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model, because))
 

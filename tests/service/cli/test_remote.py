@@ -196,7 +196,8 @@ def test_a_grip_is_told_with_its_bounds_and_rounded_up(client: Mock, say: Say, m
     ]
     client.model.return_value = replace(MODEL, diagnostics={"chosen_because": "hierarchical: grasps differ"})
     question = ("plan", "paper", "--load", "2", "--contact-area", "1e-4")
-    assert json.loads(say(*question, "--json"))["chosen_because"] == "hierarchical: grasps differ"
+    told = json.loads(say(*question, "--json"))
+    assert (told["material"], told["chosen_because"]) == (MODEL.material, "hierarchical: grasps differ")
     assert "hierarchical: grasps differ" in say(*question)
     assert "grasps differ" not in say(*question, "--method", "hierarchical")
     asked.return_value = replace(GRIP, feasible_interval=(3.0, math.inf), largest_load=math.inf, of="element")
