@@ -84,6 +84,10 @@ class Prior(Options):
     velocity_effect: Annotated[float, Option(1e-4, 10.0, "-", "a usual margin, as of what is identifiable")] = 0.1
     """Standard deviation of what velocity changes over its reference span, as a part of friction, where the size of
     β₁ matters and no sample shows it."""
+    least_velocity_effect: Annotated[
+        float, Option(1e-4, 10.0, "-", "gouge and a bench at 1 µm/s to 0.2 mm/s: 0.1 to 6 %, root mean square 4.4")
+    ] = 0.05
+    """The least of it from rest to the speed of slip, however slow, where no sample shows β₁."""
     unknown_velocity: Annotated[float, Option(1e-6, 1.0, "m/s", "incipient slip: 0.1 to 10 mm/s")] = 1e-3
     """Root mean square of those unknown: then 2 % of friction; of rocks it is 1 to 3 % a decade (Marone, 1998)."""
     velocity_tilt: Annotated[float, Option(0.0, 10.0, "-", "a third slower or faster at half the force")] = 0.5

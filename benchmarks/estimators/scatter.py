@@ -16,6 +16,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,8 +62,15 @@ KINDS = {
 }
 
 
-def grasp(kind: Kind, rng: np.random.Generator) -> FrictionSamples:
-    """Samples of one grasp: elements of a growing contact that slip from its rim inwards."""
+def grasp(
+    kind: Kind,
+    rng: np.random.Generator,
+    law: np.ndarray = TRUTH,
+    speeds: Callable[[np.ndarray, np.random.Generator], np.ndarray] | None = None,
+) -> FrictionSamples:
+    """Samples of one grasp: elements of a growing contact that slip from its rim inwards, at ``speeds`` (m/s) that
+    are made of what they slip at.
+    """
     axis = np.linspace(-1.0, 1.0, SIDE)
     radius = np.hypot(*np.meshgrid(axis, axis))
     load, reach = rng.uniform(0.8, 1.2) * np.linspace(0.6, 1.4, FRAMES), rng.uniform(0.2, 0.5)
@@ -73,9 +81,10 @@ def grasp(kind: Kind, rng: np.random.Generator) -> FrictionSamples:
     speed = 4e-3 * rng.uniform(0.5, 1.5) * np.maximum(radius - stick, 0.0) / reach + 2e-4
     frame, element = np.nonzero(slipping.reshape(FRAMES, -1))
     v, f_n = speed[slipping], pressure[slipping]
-    law = TRUTH @ [np.ones(len(v)), v, f_n]
+    v = v if speeds is None else speeds(v, rng)
+    expected = law @ [np.ones(len(v)), v, f_n]
     error = rng.standard_t(4.0, len(v)) / np.sqrt(2.0) if kind.heavy else rng.standard_normal(len(v))
-    mu = factor(kind, rng.standard_normal()) * law + places(kind, rng)[element] + kind.within * error
+    mu = factor(kind, rng.standard_normal()) * expected + places(kind, rng)[element] + kind.within * error
     seen = f_n + kind.force_noise * rng.standard_normal(len(v))
     seen = np.maximum(seen, 1e-3)
     one = np.ones(len(v))
@@ -111,11 +120,11 @@ def oracle_widths(kind: Kind, data: list[FrictionSamples]) -> np.ndarray:
     return np.asarray(2.0 * special.ndtri(0.975) * np.sqrt(np.diag(np.linalg.inv(information))))
 
 
-def achieved(kind: Kind, told: float, at: tuple[float, float] = WORKING_POINT) -> float:
+def achieved(kind: Kind, told: float, at: tuple[float, float] = WORKING_POINT, law: np.ndarray = TRUTH) -> float:
     """Probability that the mean friction of a new grasp's contact is below what was told ``at`` v and f_n."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     v, f_n = at
-    mean = factor(kind, nodes) * (TRUTH @ [1.0, v, f_n])
+    mean = factor(kind, nodes) * (law @ [1.0, v, f_n])
     deviation = np.sqrt((kind.between_places**2 + kind.within**2) / CONTACT)
     return float(weights @ special.ndtr((told - mean) / deviation) / weights.sum())
 

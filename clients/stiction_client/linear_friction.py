@@ -326,9 +326,10 @@ class LinearFriction:
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
 
-        Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+        Slower than the data is not outside where these show how velocity changes friction: slip is never observed at
+        rest, and a grasp that holds is the limit v → 0.
         """
-        return extrapolation(self.domain, tangential_velocity, normal_force)
+        return extrapolation(self, tangential_velocity, normal_force)
 
     @property
     def stale(self) -> str | None:

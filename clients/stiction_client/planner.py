@@ -19,7 +19,7 @@ from stiction_client.holding import LoadedContact
 from stiction_client.linear_friction import KINDS, check_model
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
-from stiction_client.support import DISAGREEMENT, Kind, kinds
+from stiction_client.support import DISAGREEMENT, Kind, kinds, slowest_shown
 
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
@@ -356,7 +356,7 @@ def _least_slip_probability(asked: Callable[[Number], _Question], refused: float
 
 
 def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
-    loaded = question.loaded
+    loaded, model = question.loaded, question.model
     with np.errstate(all="ignore"):  # entries that are settled take part in the steps of the others
         ends = loaded.interval(loaded.root(question.limit), question.above)
         low, high, holds = np.broadcast_arrays(*ends, *given)[:3]
@@ -365,18 +365,19 @@ def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
             outcome[~holds] = _causes(question.only(~holds))
         low, high = np.where(holds, low, np.nan), np.where(holds, high, np.nan)
         element = question.element_force(low)
-        domain = question.model.domain
-        inside = (domain.normal_force[0] <= element) & (element <= domain.normal_force[1])
+        (least_force, most_force), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
+        inside = (least_force <= element) & (element <= most_force)
+        inside &= (slowest_shown(model) <= question.velocity) & (question.velocity <= fastest)
         return RequiredForces(
             normal_force=np.asarray(loaded.force(low)),
             feasible_interval=(np.asarray(loaded.force(low)), np.asarray(loaded.force(high))),
             element_force=np.asarray(element),
             friction_coefficient=np.asarray(loaded.quantile(loaded.unit * low)[0]),
-            within_domain=np.asarray(inside & (question.velocity <= domain.tangential_velocity[1])),
+            within_domain=np.asarray(inside),
             outcome=outcome,
             of=question.of,
             elements=np.broadcast_to(question.elements, low.shape),
-            support=np.where(holds, kinds(question.model, question.velocity, element, question.model.stale), ""),
+            support=np.where(holds, kinds(model, question.velocity, element, model.stale), ""),
         )
 
 

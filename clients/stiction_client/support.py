@@ -29,6 +29,11 @@ UNNAMED_SENSOR = "unknown"
 """What the sensor of logs that name none is called: any may be among them."""
 ELEMENT_AREAS = "element_areas"
 """Diagnostic, a sentence: elements of the material's grasps differ in their area, and of which one forces are."""
+SLOWEST_SLIP = "slowest_slip"
+"""Diagnostic, m/s: slower than that hardly any sample slid, of a model whose samples do not show how friction changes
+with velocity, so that slower its slope is an assumption."""
+ASSUMED_CHANGE = "assumed_change"
+"""Diagnostic, a sentence: by how much friction is assumed to change between rest and the speed of slip."""
 SAME_GRASPS = "same_grasps"
 """Diagnostic, a sentence: which of a material's logs are of a grasp that another log of it has, and do not count."""
 UNCHECKED = "unchecked_logs"
@@ -48,6 +53,7 @@ DISAGREEMENT = "disagreement"
 NOTES = (
     WEAKENING,
     ONE_RECORD,
+    ASSUMED_CHANGE,
     SAME_GRASPS,
     UNCHECKED,
     OTHERS_CALIBRATIONS,
@@ -138,7 +144,7 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("stale", f"{changed}: clean the surface; if it stays so, begin a new epoch")
     if stale is not None:
         return Support("stale", f"the model is outdated: {stale}")
-    part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    part = float(uncertainty(model, *within(model, tangential_velocity, normal_force)))
     if tangential_velocity > 0.0 and _knows_no_velocity(model):
         return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
     if not part <= UNCERTAIN or not any(model.identifiable.tolist()):
@@ -146,10 +152,13 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     reason = _takes_grasps_as_alike(model)
     if reason is not None:
         return Support("not identified", reason)
-    outside = extrapolation(model.domain, tangential_velocity, normal_force)
+    outside = extrapolation(model, tangential_velocity, normal_force)
     if outside is not None:
         part = _uncertainty_outside(model, tangential_velocity, normal_force)
         known = f"the expected friction is known to within ± {part:.0%} there"
+        if tangential_velocity < slowest_shown(model):
+            known += ", if velocity changes it no more than is assumed"
+            return Support("extrapolated", f"{outside}; {known}: record slip at other speeds")
         return Support("extrapolated", f"{outside}; {known}: record a grasp there")
     return Support("supported", f"the samples determine the expected friction to within ± {part:.1%}")
 
@@ -168,10 +177,10 @@ def kinds(
         return np.full(v.shape, "implausible")
     beyond = np.logical_not(_can_be(model, _expected(model, v, f_n)))
     is_stale = np.full(v.shape, stale is not None or bool(model.diagnostics.get("surface_change")))
-    identified = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
+    identified = np.asarray(uncertainty(model, *within(model, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
     unknown = ~identified | ((v > 0.0) & _knows_no_velocity(model)) | (_takes_grasps_as_alike(model) is not None)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
-    outside = (f_n < low) | (f_n > high) | (v > fastest)
+    outside = (f_n < low) | (f_n > high) | (v > fastest) | (v < slowest_shown(model))
     each = {"implausible": beyond, "stale": is_stale, "not identified": unknown, "extrapolated": outside}
     return np.select([*each.values()], [*each], "supported")
 
@@ -203,10 +212,18 @@ def uncertainty(model: Model, tangential_velocity: Number, normal_force: Number)
     return select(measurable, half / select(measurable, mean, 1.0), math.inf)
 
 
-def within(domain: Domain, tangential_velocity: Number, normal_force: Number) -> tuple[Number, Number]:
-    """The nearest v and f_n in the data; any v below them is near enough, as the limit v → 0."""
-    low, high = domain.normal_force
-    return least(tangential_velocity, domain.tangential_velocity[1]), least(greatest(normal_force, low), high)
+def within(model: Model, tangential_velocity: Number, normal_force: Number) -> tuple[Number, Number]:
+    """The nearest v and f_n that the data show (``slowest_shown``)."""
+    (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
+    v = greatest(least(tangential_velocity, fastest), slowest_shown(model))
+    return v, least(greatest(normal_force, low), high)
+
+
+def slowest_shown(model: Model) -> float:
+    """The least v, m/s, of which the data show friction: 0, as the limit v → 0, where they show how velocity changes
+    it, else that of the slowest slip.
+    """
+    return float(model.diagnostics.get(SLOWEST_SLIP) or 0.0)
 
 
 def beyond_velocity(domain: Domain, tangential_velocity: Number) -> Number:
@@ -236,14 +253,16 @@ def extrapolation_scale(model: Model) -> float:
     return BEND * abs(float(b0 + 0.5 * (slowest + fastest) * b1 + 0.5 * (low + high) * b2))
 
 
-def extrapolation(domain: Domain, tangential_velocity: float, normal_force: float) -> str | None:
+def extrapolation(model: Model, tangential_velocity: float, normal_force: float) -> str | None:
     """Which of v (m/s) and f_n (N an element) lies outside the data; None where neither does.
 
-    Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+    Slower than the data is not outside where these show how velocity changes friction (``slowest_shown``): slip is
+    never observed at rest, and a grasp that holds is the limit v → 0.
     """
+    velocities = slowest_shown(model), model.domain.tangential_velocity[1]
     asked = (
-        ("tangential velocity", tangential_velocity, (0.0, domain.tangential_velocity[1]), "m/s"),
-        ("normal force", normal_force, domain.normal_force, "N an element"),
+        ("tangential velocity", tangential_velocity, velocities, "m/s"),
+        ("normal force", normal_force, model.domain.normal_force, "N an element"),
     )
     remarks = [
         f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
@@ -339,8 +358,8 @@ def _too_fast(model: Model, tangential_velocity: float, normal_force: float) -> 
     of v. None where it is not so.
     """
     slowest = model.domain.tangential_velocity[0]
-    part = float(uncertainty(model, *within(model.domain, slowest, normal_force)))
-    asked = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    part = float(uncertainty(model, *within(model, slowest, normal_force)))
+    asked = float(uncertainty(model, *within(model, tangential_velocity, normal_force)))
     if not (tangential_velocity < slowest and part <= UNCERTAIN < asked):
         return None
     known = f"the expected friction is known to within ± {part:.1%} where slip was slowest, at {slowest:.4g} m/s"

@@ -11,7 +11,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Conditional, Products, Whole, blocks_of
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import PosteriorGrid, ScaleNodes, posterior_grid
-from estimators.linear.priors import WEAK, ScatterPrior, structured
+from estimators.linear.priors import WEAK, ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
@@ -131,7 +131,7 @@ def hierarchical(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Hierarchi
         grid=grid,
         scores=tuple(scores),
         at=data.mean_row(),
-        prior=structured(scatter_prior, len(grid.model.sensors)),
+        prior=grid.prior,
         sampled=tuple(f"log_{name}" for name in scales),
         names=("beta0", "beta1", "beta2", *scales),
         proposal=standard(len(scales)),

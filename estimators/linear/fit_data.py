@@ -1,5 +1,6 @@
 """What the data say, in the form that every method reads: a factor, its clusters and, where kept, the samples."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias, cast
@@ -100,6 +101,10 @@ class FitData:
     def mean_row(self) -> FloatArray:
         """(1, v, f_n) at the weighted mean of the data, [3]."""
         return np.array([1.0, *self.factor.mean[:2]], dtype=float)
+
+    def speed(self) -> tuple[float, float]:
+        """Weighted mean and standard deviation of v, m/s, those that are unknown as of 0."""
+        return float(self.factor.mean[0]), float(self.factor.triangle[0, 0]) / math.sqrt(self.effective_n)
 
     def grasp_statistics(self) -> tuple[GraspStatistics, ...]:
         """Each grasp place by place, as one of so many; moments that know of no places count as those of one."""

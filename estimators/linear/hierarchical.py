@@ -234,6 +234,11 @@ class Hierarchical:
         mean = 0.5 * (np.log(0.5 * total) - special.digamma(shape))
         return np.asarray(mean), float(0.5 * np.sqrt(special.polygamma(1, shape)))
 
+    def with_slope(self, precision: float) -> "Hierarchical":
+        """The same with a prior of β₁ ~ N(0, 1/``precision``), precision in (m/s)², beside its own."""
+        row = np.append(self.pooled.root[1], -self.pooled.mean[1])
+        return replace(self, prior=self.prior + precision * _squares(row[None])[0])
+
     def centred_at(self, coefficients: FloatArray) -> "Hierarchical":
         """The same with another b̂ [3]."""
         return replace(self, direction=_direction(self.pooled, coefficients))

@@ -13,10 +13,10 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierarchical
 from estimators.linear.log_sum import log_sum
 from estimators.linear.normal_inverse_gamma import exact_posterior
-from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
+from estimators.linear.priors import WEAK, ScatterPrior, structured, weak_spans
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.slopes_of_grasps import with_slopes_that_differ
-from estimators.linear.unknown_velocity import offset_variance
+from estimators.linear.unknown_velocity import AssumedSlope, assumed_slope, offset_variance
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,7 +47,7 @@ class ScaleNodes(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class PosteriorGrid:
     """Nodes over ``axes``, log λ [l], log ρ [r] and, of several sensors, log ν [q]; with the sums at the first two, and
-    ``log_marginal`` [l, r (, q)].
+    ``log_marginal`` [l, r (, q)]. ``slope``: what of β₁ is assumed, where the data do not show it.
     """
 
     model: Hierarchical
@@ -55,6 +55,13 @@ class PosteriorGrid:
     products: Products
     log_marginal: FloatArray
     nodes: ScaleNodes
+    slope: AssumedSlope | None = None
+
+    @property
+    def prior(self) -> str:
+        """The prior in words and numbers."""
+        assumed = 0.0 if self.slope is None else self.slope.precision
+        return structured(self.model.scatter_prior, len(self.model.sensors), assumed)
 
     def prior_shift(self) -> FloatArray:
         """Move of each coefficient, in standard deviations, were the prior of β twice as wide; at the scales' mode."""
@@ -72,12 +79,20 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
     """Posterior of the hierarchical model for these data, on a grid that closes in on where its mass lies.
 
     b̂, along which a grasp scales the law, is the posterior mean of the grid before, of which also follows by how much
-    unknown velocities put friction off.
+    unknown velocities put friction off. Where the data leave β₁ open, a second time with what is assumed of it.
     """
     pooled = exact_posterior(data)
     grasps = with_slopes_that_differ(data.grasp_statistics(), pooled.mean)
     spans = weak_spans(data.domain, data.element_area)
-    model = hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior)
+    grid = _closed_in(hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior), data)
+    slope = assumed_slope(data, float(grid.nodes.moments()[1][1, 1]))
+    if slope is None:
+        return grid
+    return replace(_closed_in(grid.model.with_slope(slope.precision), data), slope=slope)
+
+
+def _closed_in(model: Hierarchical, data: FitData) -> PosteriorGrid:
+    """The posterior on a grid that closes in: b̂ and what unknown velocities are off by follow from each grid before."""
     box = _widest(model)
     fine = GRID.fine if len(box) == 2 else GRID.beside_gains
     for turn in range(GRID.rounds):

@@ -103,8 +103,12 @@ def positive_friction() -> str:
     return conjugate_prior() + "; mean friction above 0 over the data's domain"
 
 
-def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1) -> str:
-    """The prior of the hierarchical model of grasps of so many ``sensors``, in words and numbers."""
+def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1, slope: float = 0.0) -> str:
+    """The prior of the hierarchical model of grasps of so many ``sensors``, in words and numbers.
+
+    ``slope``: the precision, (m/s)², of what is assumed of β₁ beside it where the data do not show it.
+    """
+    assumed = f"beta1 ~ N(0, ({1.0 / math.sqrt(slope):.3g} s/m)^2) besides; " if slope > 0.0 else ""
     gains = (
         f"between sensors kappa ~ half-Student-t on {PRIOR.sensor_degrees_of_freedom:g} with scale "
         f"{PRIOR.sensor_scatter:g}; "
@@ -112,7 +116,7 @@ def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1) -> str:
     return (
         f"friction at the mean of the data ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span "
         f"~ N(0, {PRIOR.width:g}^2), the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa "
-        f"times the element area, or the range seen if less; between grasps {scatter_prior}; "
+        f"times the element area, or the range seen if less; {assumed}between grasps {scatter_prior}; "
         f"{gains if sensors > 1 else ''}between places omega ~ "
         f"half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; {_of_scatter()}"
     )

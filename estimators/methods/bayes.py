@@ -22,7 +22,7 @@ from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior
 from estimators.linear.shared_errors import shared_by_elements
 from estimators.methods.conjugate import sensitivity
-from estimators.methods.reporting import Diagnostics, pooled_prior, report, sensor_gain
+from estimators.methods.reporting import Diagnostics, pooled_prior, report, sensor_gain, slope_assumed
 from estimators.not_converged import NotConverged
 from estimators.sampling.chain import Chain, sample
 
@@ -84,7 +84,8 @@ def fit(
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
     if isinstance(posterior, HierarchicalPosterior):
-        diagnostics |= pooled_prior(posterior.grid.nodes, scatter_prior) | sensor_gain(posterior.grid.nodes)
+        grid = posterior.grid
+        diagnostics |= pooled_prior(grid.nodes, scatter_prior) | sensor_gain(grid.nodes) | slope_assumed(grid.slope)
     if name != "hierarchical":
         diagnostics["assumes"] = "independent errors"
     independent = name != "hierarchical" and data.cluster_kind != "element"

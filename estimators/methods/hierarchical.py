@@ -7,8 +7,8 @@ from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
-from estimators.linear.priors import WEAK, ScatterPrior, structured
-from estimators.methods.reporting import Diagnostics, by_coefficient, pooled_prior, report, sensor_gain
+from estimators.linear.priors import WEAK, ScatterPrior
+from estimators.methods.reporting import Diagnostics, by_coefficient, pooled_prior, report, sensor_gain, slope_assumed
 
 
 def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
@@ -20,11 +20,11 @@ def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
     grid = posterior_grid(data, scatter_prior)
     found = summarise(grid.nodes, data.mean_row())
     diagnostics: Diagnostics = {
-        "prior": structured(scatter_prior, len(grid.model.sensors)),
+        "prior": grid.prior,
         "nodes": float(len(grid.nodes.weight)),
     }
     diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
-    diagnostics |= pooled_prior(grid.nodes, scatter_prior) | sensor_gain(grid.nodes)
+    diagnostics |= pooled_prior(grid.nodes, scatter_prior) | sensor_gain(grid.nodes) | slope_assumed(grid.slope)
     summary = PosteriorSummary(
         found.coefficients,
         found.covariance,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from estimators.defaults import IDENTIFIABILITY, REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
@@ -18,9 +19,17 @@ from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
+from estimators.linear.unknown_velocity import AssumedSlope
 from estimators.methods.identifiability import effects, identifiable, takes_as_independent, what_to_record
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
-from stiction_client.support import ELEMENT_AREAS, ONE_RECORD, ONLY_SENSOR, SENSOR_GAIN
+from stiction_client.support import (
+    ASSUMED_CHANGE,
+    ELEMENT_AREAS,
+    ONE_RECORD,
+    ONLY_SENSOR,
+    SENSOR_GAIN,
+    SLOWEST_SLIP,
+)
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -45,6 +54,19 @@ def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
         "scatter_prior": f"how much its grasps differ is expected from {origin}, as far as they do not show it",
         ALONE: alone.value,
         f"{ALONE}_degrees_of_freedom": alone.degrees_of_freedom,
+    }
+
+
+def slope_assumed(slope: AssumedSlope | None) -> Diagnostics:
+    """Where data do not show how friction changes with velocity: below which speed, and what is assumed of it."""
+    if slope is None:
+        return {}
+    most = special.ndtri(IDENTIFIABILITY.ends[1]) * slope.change
+    return {
+        SLOWEST_SLIP: slope.slowest,
+        ASSUMED_CHANGE: "its samples do not show how friction changes with velocity: between rest and the "
+        f"{slope.speed:.4g} m/s at which they slid on average it is assumed to change by at most ± {most:.0%} (95 %); "
+        "record slip at other speeds, best slower",
     }
 
 

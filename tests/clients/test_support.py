@@ -89,6 +89,61 @@ def test_friction_at_rest_asks_for_slower_slip_where_all_was_as_fast(make_model:
     assert (steep.support_at(0.0, 0.1).kind, kinds(steep, 0.0, 0.1)) == ("not identified", "not identified")
 
 
+def of_one_speed(make_model: Make, noted: bool = True) -> FrictionModel:
+    """Of slip at 1 mm/s, from where to rest friction is assumed to change by a twentieth (a standard deviation)."""
+    slope = 0.05 * 0.4 / 1e-3
+    along = slope * np.array([-1e-3, 1.0, 0.0])  # of β, by which friction at 1 mm/s stays
+    model = make_model((0.4, 0.0, 0.0), EXACT + np.outer(along, along))
+    told = {"slowest_slip": 1e-3, "assumed_change": "it is assumed"} if noted else {}
+    return replace(model, domain=replace(model.domain, tangential_velocity=(1e-3, 1e-3)), diagnostics=told)
+
+
+def test_slower_than_all_slip_is_outside_of_data_that_do_not_show_what_velocity_does(make_model: Make) -> None:
+    model = of_one_speed(make_model)
+    half = 0.05 * special.stdtrit(model.degrees_of_freedom, 0.975)
+    found = model.support_at(0.0, 0.1)
+    outside = "tangential velocity extrapolated to 0 m/s, observed 0.001 to 0.001"
+    assert model.extrapolation(0.0, 0.1) == outside
+    assert found == Support(
+        "extrapolated",
+        f"{outside}; the expected friction is known to within ± {half:.0%} there, if velocity changes it no more than "
+        "is assumed: record slip at other speeds",
+    )
+    assert model.support_at(1e-3, 0.1).kind == "supported"
+    assert model.extrapolation(1e-3, 0.1) is None
+    assert kinds(model, [0.0, 9e-4, 1e-3, 2e-3], 0.1).tolist() == [*["extrapolated"] * 2, "supported", "extrapolated"]
+    assert model.notes == ("it is assumed",)
+
+
+def test_what_is_not_known_where_it_slid_is_not_at_rest_either(make_model: Make) -> None:
+    model = of_one_speed(make_model)
+    vague = replace(model, covariance=model.covariance + np.diag([1e-3, 0.0, 0.0]))
+    assert vague.support_at(0.0, 0.1).kind == kinds(vague, 0.0, 0.1) == "not identified"
+    nothing = replace(model, identifiable=np.zeros(3, bool))
+    assert nothing.support_at(0.0, 0.1).kind == kinds(nothing, 0.0, 0.1) == "not identified"
+    assert replace(model, current=False).support_at(0.0, 0.1).kind == "stale"
+
+
+def test_a_model_stored_without_such_notes_means_what_it_meant(make_model: Make) -> None:
+    before = of_one_speed(make_model, noted=False)
+    assert before.extrapolation(0.0, 0.1) is None
+    assert before.support_at(0.0, 0.1).kind == kinds(before, 0.0, 0.1) == "not identified"
+
+
+def test_a_planner_is_given_a_force_that_allows_for_what_is_assumed_and_is_told(make_model: Make) -> None:
+    model = of_one_speed(make_model)
+    grip = required_normal_force(model, 1.0, 1e-2, contact_area=6e-5)
+    sure = required_normal_force(replace(model, covariance=EXACT), 1.0, 1e-2, contact_area=6e-5)
+    assert grip.normal_force > 1.05 * sure.normal_force
+    assert (grip.support, grip.within_domain) == ("extrapolated", False)
+    assert grip.warning == model.extrapolation(0.0, grip.element_force)
+    assert grip.notes == model.notes
+    many = required_normal_force(model, np.array([1.0, 1.0]), 1e-2, contact_area=6e-5, tangential_velocity=[0.0, 1e-3])
+    assert many.support.tolist() == ["extrapolated", "supported"]
+    assert many.within_domain.tolist() == [False, True]
+    assert many.normal_force[0] == pytest.approx(grip.normal_force)
+
+
 def test_friction_that_could_be_anything_is_told_without_a_part_of_it(make_model: Make) -> None:
     told = make_model((0.4, 0.0, 0.0), np.diag([1.0, 0.0, 0.0])).support_at(0.0, 0.1).advice
     assert told == "the samples do not determine the expected friction there: record more grasps, and others"

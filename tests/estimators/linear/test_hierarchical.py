@@ -34,9 +34,17 @@ def grasp(seed: int, tau: float = 0.06, omega: float = 0.02, sigma: float = 0.03
 
 
 def dense(
-    data: FitData, about: np.ndarray, offset: float, scales: tuple[float, ...], kappa: float = 0.0
+    data: FitData,
+    about: np.ndarray,
+    offset: float,
+    scales: tuple[float, ...],
+    kappa: float = 0.0,
+    slope: float = 0.0,
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Log density of μ, and mean and covariance of β, from covariance matrices of all samples."""
+    """Log density of μ, and mean and covariance of β, from covariance matrices of all samples.
+
+    ``slope``: the precision, (m/s)², of what is assumed of β₁.
+    """
     sigma, tau, omega = scales
     seen = data.observations
     assert seen is not None
@@ -56,26 +64,26 @@ def dense(
     noise += kappa**2 * (sensor[:, None] == sensor) * np.outer(expected, expected)
     rows = np.diag(np.concatenate([[1.0], weak_spans(data.domain, data.element_area)]))
     rows[0] = data.mean_row()
-    width = PRIOR.width * np.linalg.inv(rows)
-    centre = np.linalg.solve(rows, [REFERENCE.friction, 0.0, 0.0])
-    marginal = stats.multivariate_normal(x @ centre, noise + x @ width @ width.T @ x.T)
-    precision = np.linalg.inv(width @ width.T)
+    weak = rows.T @ rows / PRIOR.width**2
+    precision = weak + slope * np.diag([0.0, 1.0, 0.0])
+    centre = np.linalg.solve(precision, weak @ np.linalg.solve(rows, [REFERENCE.friction, 0.0, 0.0]))
+    marginal = stats.multivariate_normal(x @ centre, noise + x @ np.linalg.solve(precision, x.T))
     covariance = np.linalg.inv(precision + x.T @ np.linalg.solve(noise, x))
     mean = covariance @ (precision @ centre + x.T @ np.linalg.solve(noise, seen.friction))
     return float(marginal.logpdf(seen.friction)), mean, covariance
 
 
 def assert_as_dense(
-    model: Hierarchical, data: FitData, about: np.ndarray, points: list[tuple[float, float, float]]
+    model: Hierarchical, data: FitData, about: np.ndarray, points: list[tuple[float, float, float]], slope: float = 0.0
 ) -> None:
     """Mean and covariance at each σ, τ and ω, and how the density differs between these."""
     ours, theirs = [], []
     for sigma, tau, omega in points:
         ratios = np.log([tau**2 / sigma**2]), np.log([omega**2 / sigma**2])
         given = model.conditional(model.whole(model.products(*ratios)), np.stack([np.log([sigma]), *ratios]))
-        log, mean, covariance = dense(data, about, model.offset, (sigma, tau, omega))
-        np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)
-        np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
+        log, mean, covariance = dense(data, about, model.offset, (sigma, tau, omega), slope=slope)
+        np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-9)
         ours.append(given.log_density[0] - log_prior(*np.log([[sigma], [tau], [omega]]))[0])
         theirs.append(log)
     np.testing.assert_allclose(np.diff(ours), np.diff(theirs), rtol=1e-8, atol=1e-7)
@@ -90,6 +98,20 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int, unkno
     model = hierarchical(data.grasp_statistics(), pooled, spans, data.mean_row()).centred_at(about)
     points = [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.05, 0.001, 0.05), (0.03, 0.5, 0.3)]
     assert_as_dense(model, data, about, points)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("spread", [0.0, 0.01])
+def test_what_is_assumed_of_a_slope_is_in_density_and_coefficients_as_in_the_dense_model(
+    count: int, spread: float
+) -> None:
+    v = 5e-3 * (1.0 + spread * np.random.default_rng(5).standard_normal(60))
+    data = gather([replace(grasp(k), tangential_velocity=v) for k in range(count)])
+    grid = posterior_grid(data)
+    assert grid.slope is not None
+    about = grid.model.pooled.root @ grid.model.direction
+    points = [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.05, 0.001, 0.05)]
+    assert_as_dense(grid.model, data, about, points, grid.slope.precision)
 
 
 def test_of_grasps_of_one_place_only_the_level_is_scaled() -> None:
@@ -284,9 +306,11 @@ def test_the_shift_by_the_prior_is_that_of_the_dense_model_whose_prior_is_twice_
     sigma = float(np.exp(grid.model.log_sigma(whole)[0][0]))
     about = grid.model.pooled.root @ grid.model.direction
     scales = sigma, sigma * float(np.exp(0.5 * lam)), sigma * float(np.exp(0.5 * rho))
-    _, narrow, covariance = dense(data, about, grid.model.offset, scales)
+    assert grid.slope is not None  # of so few samples
+    slope = grid.slope.precision
+    _, narrow, covariance = dense(data, about, grid.model.offset, scales, slope=slope)
     monkeypatch.setitem(globals(), "PRIOR", replace(PRIOR, width=2.0 * PRIOR.width))
-    _, wide, _ = dense(data, about, grid.model.offset, scales)
+    _, wide, _ = dense(data, about, grid.model.offset, scales, slope=0.25 * slope)
     expected = np.abs(wide - narrow) / np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(grid.prior_shift(), expected, rtol=1e-5)
     assert expected.min() > 1e-5

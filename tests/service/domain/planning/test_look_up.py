@@ -111,6 +111,22 @@ def test_slower_than_the_samples_is_inside_and_faster_is_not(
     assert not ask(model, FrictionQuery(1.001 * high, f_n, None)).within_domain
 
 
+def test_friction_at_rest_of_slip_at_one_speed_is_outside_and_says_what_is_assumed(
+    ask: Callable[..., Any], ramp: GraspLog
+) -> None:
+    samples = slipcore.collect_samples(ramp, slipcore.detect_slip(ramp))
+    steady = replace(samples, tangential_velocity=np.full(len(samples), 5e-3))
+    parts = [steady.take(np.arange(len(steady)) % 4 == grasp) for grasp in range(4)]
+    model = replace(estimators.fit(parts, method="hierarchical"), method="ols")  # the one that is asked for
+    f_n = 0.5 * sum(model.domain.normal_force)
+    answer, sliding = ask(model, FrictionQuery(0.0, f_n, 0.01)), ask(model, FrictionQuery(5e-3, f_n, 0.01))
+    assert (answer.within_domain, answer.support) == (False, "extrapolated")
+    assert (sliding.within_domain, sliding.support) == (True, "supported")
+    assert answer.warning == "tangential velocity extrapolated to 0 m/s, observed 0.005 to 0.005"
+    assert "between rest and the 0.005 m/s at which they slid" in "; ".join(answer.notes)
+    assert 0.5 * answer.mean < answer.friction_coefficient < sliding.friction_coefficient - 0.15 * answer.mean
+
+
 @pytest.mark.parametrize("edge", [0, 1])
 def test_forces_beyond_the_samples_are_outside_on_both_sides(
     ask: Callable[..., Any], model: estimators.FrictionModel, edge: int
