@@ -1,5 +1,6 @@
 """The address of a service: what a caller gives, checked before anything is sent."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -16,8 +17,22 @@ SHOWN_URL = 80
 MOST_PORT = 65535
 
 
-def service_address(url: str) -> httpx.URL:
-    """The address of a service in its parts; raises ``InvalidArgument`` for one that no service can have."""
+def authorization(key: str | None) -> dict[str, str]:
+    """The header of an access key, by default that of ``STICTION_KEY``; raises ``InvalidArgument`` for what it cannot
+    hold.
+    """
+    key = os.environ.get("STICTION_KEY") if key is None else key
+    if key and not (isinstance(key, str) and key.isascii() and key.isprintable()):  # it is not shown
+        what = "one with other characters" if isinstance(key, str) else f"of type {type(key).__name__}"
+        raise InvalidArgument("key", what, "printable ASCII, as `stiction keys create` prints it")
+    return {"Authorization": f"Bearer {key}"} if key else {}
+
+
+def service_address(url: str | None) -> httpx.URL:
+    """The address of a service in its parts, by default that of ``STICTION_URL``, or of a service on this machine;
+    raises ``InvalidArgument`` for one that no service can have.
+    """
+    url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
     of_kind("address", url, str)
     with checked(url):
         address = httpx.URL(url)

@@ -22,7 +22,7 @@ def within(name: str, value: object, low: float, high: float, unit: str = "") ->
         if low <= number <= high:
             return number
         raise InvalidArgument(name, value, _range(low, high, unit))
-    array = _array(name, value)
+    array = as_array(name, value)
     if array.dtype.kind not in "iuf" or _holds_truth(value) or np.ma.is_masked(value):
         raise InvalidArgument(name, shown(value), f"numbers: {_range(low, high, unit)}")
     numbers = array.astype(np.float64)
@@ -48,9 +48,17 @@ def whole(name: str, value: object, low: int, high: int, unit: str = "") -> int:
     return int(found)
 
 
+def as_array(name: str, value: object) -> NDArray[Any]:
+    """``value`` as an array of whatever it holds; raises ``InvalidArgument`` for lists of unequal lengths in a list."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        raise InvalidArgument(name, shown(value), "one number, or an array of them") from None
+
+
 def of_one_shape(**given: object) -> None:
     """Raises ``InvalidArgument`` for arrays that do not broadcast, with their names and shapes."""
-    shapes = {name: _array(name, value).shape for name, value in given.items() if not isinstance(value, ONE)}
+    shapes = {name: as_array(name, value).shape for name, value in given.items() if not isinstance(value, ONE)}
     if not shapes:
         return
     try:
@@ -92,14 +100,6 @@ def for_json(name: str, value: object) -> Any:
     if value is None or isinstance(value, str | int | float):
         return value
     raise InvalidArgument(name, shown(value), "numbers, text, and lists and objects of these")
-
-
-def _array(name: str, value: object) -> NDArray[Any]:
-    """``value`` as an array of whatever it holds; raises ``InvalidArgument`` for lists of unequal lengths in a list."""
-    try:
-        return np.asarray(value)
-    except ValueError:
-        raise InvalidArgument(name, shown(value), "one number, or an array of them") from None
 
 
 def _holds_truth(value: object) -> bool:

@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-import os
 import time
 import zlib
 from collections.abc import Mapping, Sequence
@@ -14,10 +13,10 @@ from typing import Any, Self
 import httpx
 
 from stiction_client import calls, head_timeout
-from stiction_client.address import DEFAULT_URL, checked, service_address
+from stiction_client.address import authorization, checked, service_address
 from stiction_client.arguments import for_json, within
 from stiction_client.container import GraspLogLike
-from stiction_client.errors import AnswerTooLarge, ConnectionFailed, InvalidArgument
+from stiction_client.errors import AnswerTooLarge, ConnectionFailed
 from stiction_client.exchange import Call, Ended, Pause, Reply, Request, T, advance
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
@@ -575,15 +574,11 @@ def _stale_after(seconds: float) -> float:
 
 
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
-    key = os.environ.get("STICTION_KEY") if key is None else key
-    url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
-    if key and not (isinstance(key, str) and key.isascii() and key.isprintable()):  # it is not shown
-        what = "one with other characters" if isinstance(key, str) else f"of type {type(key).__name__}"
-        raise InvalidArgument("key", what, "printable ASCII, as `stiction keys create` prints it")
+    authorized = authorization(key)
     timeout = float(within("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s"))
     return {
         "base_url": service_address(url),
-        "headers": {"Accept-Encoding": UNPACKED} | ({"Authorization": f"Bearer {key}"} if key else {}),
+        "headers": {"Accept-Encoding": UNPACKED} | authorized,
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
 

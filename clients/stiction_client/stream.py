@@ -14,10 +14,11 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
 from stiction_client import json_values
-from stiction_client.address import service_address
-from stiction_client.arguments import within
+from stiction_client.address import authorization, service_address
+from stiction_client.arguments import as_array, of_kind, shown, within
 from stiction_client.controller import ControlSettings, gains
-from stiction_client.errors import AnswerTimedOut, ConnectionFailed, StreamEnded, UnexpectedAnswer
+from stiction_client.elementwise import FloatArray
+from stiction_client.errors import AnswerTimedOut, ConnectionFailed, InvalidArgument, StreamEnded, UnexpectedAnswer
 from stiction_client.records import Finding
 
 RESUMABLE = (1001, 1006, 1012, 4503)
@@ -39,19 +40,20 @@ ANSWER_TIMEOUT = 30.0
 class SlipStream:
     """One grasp, frame by frame; use it as a context manager.
 
-    ``position`` [n, m, 3] m at rest, ``element_area`` m². Without a ``detector`` the service takes the one that suits
+    ``url`` and ``key``, where None: those of ``STICTION_URL`` and ``STICTION_KEY``. ``position`` [n, m, 3] m at rest,
+    ``element_area`` m². Without a ``detector`` the service takes the one that suits
     such frames. With ``keep`` the frames can be stored as a grasp log of
     ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
     ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
     ``known``, and where it has none recognises which of ``materials`` this is; frames then need forces, or a ``sensor``
     whose gel the service knows. A connection that breaks is taken up again, with the frames that were not answered.
     Raises ``ConnectionFailed`` with the service's reason where it refuses, and ``AnswerTimedOut`` where an answer is
-    late: it may be waited for again.
+    late: it may be waited for again; and ``InvalidArgument`` for what cannot be sent.
     """
 
     def __init__(
         self,
-        url: str,
+        url: str | None,
         position: ArrayLike,
         element_area: float,
         *,
@@ -64,9 +66,9 @@ class SlipStream:
         known: bool = True,
         materials: Sequence[str] = (),
     ) -> None:
-        rest = np.asarray(position, dtype="<f8")
+        rest = _numbers("position", position)
         self._url = f"{str(service_address(url)).rstrip('/').replace('http', 'ws', 1)}/v1/stream"
-        self._headers = {"Authorization": f"Bearer {key}"} if key else {}
+        self._headers = authorization(key)
         self._open = ExitStack()
         self._session, self._number, self._answered = "", 0, -1
         self._detector: str | None = None
@@ -77,7 +79,10 @@ class SlipStream:
         opening |= {"sensor": sensor, "material": material, "keep": keep}
         if detector is not None:
             opening["detector"] = detector
+        if isinstance(materials, str):
+            raise InvalidArgument("materials", shown(materials), "a list of names")
         if control is not None:
+            of_kind("control", control, ControlSettings)
             opening["control"] = _control(control) | {"known": known}
             if materials:
                 opening["control"] |= {"materials": list(materials)}
@@ -125,15 +130,16 @@ class SlipStream:
 
         ``command``: the normal force commanded to the gripper, N; who watches the stream sees it. ``gripper_force``:
         the one that it reports, N, with its standard ``gripper_force_deviation`` N: forces that the service
-        reconstructs add up to it. Raises ``InvalidArgument`` for what is no force.
+        reconstructs add up to it. Raises ``InvalidArgument`` for what is no force, and no number or array of them; the
+        stream then goes on.
         """
-        frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": float(time)}
-        given = {"displacement": displacement, "force": force, "object_pose": object_pose, "normal": normal}
-        for name, value in given.items():
+        frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": _number("time", time)}
+        frame["displacement"] = _numbers("displacement", displacement).tobytes()
+        for name, value in {"force": force, "object_pose": object_pose, "normal": normal}.items():
             if value is not None:
-                frame[name] = np.asarray(value, dtype="<f8").tobytes()
+                frame[name] = _numbers(name, value).tobytes()
         if command is not None:
-            frame["command"] = float(command)
+            frame["command"] = _number("command", command)
         reports = {"gripper_force": gripper_force, "gripper_force_deviation": gripper_force_deviation}
         for name, reported in reports.items():
             if reported is not None:
@@ -264,6 +270,20 @@ class SlipStream:
 
     def _unexpected(self, answer: Any) -> UnexpectedAnswer:
         return UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
+
+
+def _numbers(name: str, value: ArrayLike) -> FloatArray:
+    """As a message has them; raises ``InvalidArgument`` for anything else, that the service ends no stream for it."""
+    found = as_array(name, value)
+    if found.dtype.kind not in "iuf" or not found.ndim:
+        raise InvalidArgument(name, shown(value), "an array of numbers")
+    return found.astype("<f8")
+
+
+def _number(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise InvalidArgument(name, shown(value), "a number")
+    return float(value)
 
 
 def _has_sound_command(answer: Mapping[str, Any]) -> bool:

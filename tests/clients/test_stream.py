@@ -208,3 +208,56 @@ def test_an_address_of_no_service_is_refused_by_name(url: str) -> None:
     """The errors of the library had come through."""
     with pytest.raises(InvalidArgument, match=r"^address is "):
         SlipStream(url, np.zeros((2, 2, 3)), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("frame", "told"),
+    [
+        ({"time": None}, "time is None; allowed: a number"),
+        ({"time": True}, "time is True; allowed: a number"),
+        ({"command": "x"}, "command is 'x'; allowed: a number"),
+        ({"displacement": None}, "displacement is None; allowed: an array of numbers"),
+        ({"displacement": 0.0}, "displacement is 0.0; allowed: an array of numbers"),
+        ({"force": "x"}, "force is 'x'; allowed: an array of numbers"),
+        ({"normal": [[0.0], [0.0, 1.0]]}, r"normal is \[\[0.0\], \[0.0, 1.0\]\]; allowed: one number, or an array"),
+        ({"object_pose": [True, False, True]}, r"object_pose is \[True, False, True\]; allowed: an array of numbers"),
+    ],
+)
+def test_what_is_no_frame_is_named_and_the_stream_goes_on(opened: Any, frame: dict[str, Any], told: str) -> None:
+    """Sent, it would end the session of an object that is held."""
+    live, (connection,) = opened([state(0)])
+    with pytest.raises(InvalidArgument, match=f"^{told}"):
+        live.send(**({"time": 0.0, "displacement": np.zeros((2, 2, 3))} | frame))
+    send(live, 1)
+    assert [answer["number"] for answer in live.answers()] == [0]
+    assert [message["type"] for message in connection.sent] == ["open", "frame"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"position": "x"}, "position is 'x'; allowed: an array of numbers"),
+        ({"control": {"least_force": 1.0}}, r"control is \{.*; allowed: an object of ControlSettings"),
+        ({"materials": "paper"}, "materials is 'paper'; allowed: a list of names"),
+        ({"key": "é"}, "key is one with other characters"),
+    ],
+)
+def test_what_opens_no_stream_is_named_before_anything_is_sent(wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(InvalidArgument, match=f"^{told}"):
+        SlipStream(**({"url": "http://service", "position": np.zeros((2, 2, 3)), "element_area": 1e-6} | wrong))
+
+
+def test_address_and_key_are_those_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, Any]] = []
+
+    @contextmanager
+    def connect(url: str, **options: Any) -> Iterator[Connection]:
+        asked.append((url, options["additional_headers"]))
+        yield Connection([OPENED])
+
+    monkeypatch.setattr(stream, "connect", connect)
+    monkeypatch.setenv("STICTION_URL", "https://elsewhere")
+    monkeypatch.setenv("STICTION_KEY", "secret")
+    SlipStream(None, np.zeros((2, 2, 3)), 1e-6)
+    SlipStream("http://service", np.zeros((2, 2, 3)), 1e-6, key="")
+    assert asked == [("wss://elsewhere/v1/stream", {"Authorization": "Bearer secret"}), ("ws://service/v1/stream", {})]
