@@ -831,6 +831,10 @@ class CheckOptions(Options):
 
     longest_interval: Annotated[float, Option(0.0, 60.0, "s", "a slip front passes an element in a tenth")] = 1.0
     """Longest time between frames, in the median."""
+    shortest_interval: Annotated[float, Option(0.0, 60.0, "s", "taxels are read at up to 4 kHz, images at 1 kHz")] = (
+        2e-4
+    )
+    """Shortest, likewise."""
     largest_stretch: Annotated[float, Option(0.0, 100.0, "-", "no gel is half as large again; scenes 0.01")] = 0.5
     """Largest strain of the whole lattice in the direction of its least, in the mean over the log."""
     stretch_frames: Annotated[

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slipcore.defaults import LIMITS
+from slipcore.arguments import array_of, real_array
+from slipcore.defaults import LIMITS, SampleOptions
 from slipcore.errors import InvalidInput
+from slipcore.options import describe_options
 
 if TYPE_CHECKING:
     from slipcore.labelled import Dataset, Variables
@@ -189,11 +191,23 @@ class GraspLog:
     @property
     def force_deviation(self) -> float:
         """Typical standard deviation (N) of reconstructed element forces, by the metadata; 0 where they tell none."""
+        return self._of_reconstruction("force_deviation") or 0.0
+
+    @property
+    def of_samples(self) -> dict[str, float]:
+        """Options of friction samples by reconstructed forces, by the metadata; none where they tell none."""
+        told = {name: self._of_reconstruction(name) for name in ("force_noise", "force_to_noise")}
+        known = {name: value for name, value in told.items() if value is not None}
+        return known if "force_noise" in known else {}
+
+    def _of_reconstruction(self, name: str) -> float | None:
+        """A number that the metadata of reconstructed forces tell; None where they tell none that could be one."""
         try:
-            typical = float(self.metadata.get("force_deviation", "0")) if self.has_reconstructed_force else 0.0
+            value = float(self.metadata.get(name, "nan")) if self.has_reconstructed_force else math.nan
         except ValueError:  # a file's own words
-            return 0.0
-        return typical if 0.0 <= typical <= LIMITS.force else 0.0
+            return None
+        low, high = describe_options(SampleOptions).get(name, (0.0, LIMITS.force))[:2]
+        return value if low <= value <= high else None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -317,9 +331,15 @@ def check_gripper_report(force: float | None, deviation: float | None, largest: 
     _gripper_force_deviation(deviation, report)
 
 
+def reported(gripper_force: FloatArray) -> FloatArray:
+    """Normal forces N that a gripper reports, NaN where it does not grip."""
+    return np.where(gripper_force >= LIMITS.gripper_deviation, gripper_force, np.nan)
+
+
 def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """One truth value an element, of exactly this shape."""
-    mask = np.array(value, order="C")  # kernels are compiled for one layout: half a minute for another
+    given = array_of(name, value, f"bool of shape {list(shape)}")
+    mask = np.array(given, order="C")  # kernels are compiled for one layout: half a minute for another
     if mask.dtype != np.bool_ or mask.shape != shape:
         raise InvalidInput(name, f"{mask.dtype} of shape {list(mask.shape)}", f"bool of shape {list(shape)}")
     mask.flags.writeable = False
@@ -335,12 +355,7 @@ def _set(record: object, name: str, value: object) -> None:
 
 
 def _array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
-    try:
-        given = np.asarray(value)
-    except ValueError as error:  # rows of different lengths
-        raise InvalidInput(name, f"not an array ({error})", "an array of real numbers") from error
-    if given.dtype.kind not in "iuf":  # text, dates and complex numbers would convert, and mean something else
-        raise InvalidInput(name, f"of dtype {given.dtype}", "an array of real numbers")
+    given = real_array(name, value)
     array = np.array(given, dtype=np.float64, order="C", copy=None if _is_immutable(given) else True)
     wanted = "[" + ", ".join("any" if size is None else str(size) for size in shape) + "]"
     matches = array.ndim == len(shape) and all(

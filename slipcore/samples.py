@@ -152,11 +152,12 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     what noise adds to a magnitude and to a quotient. Where pressure p differs over an element, friction that goes with
     it is that of ∫p²/∫p, not of the mean (``_as_friction_averages``). A log without (observable) slip gives no samples,
     of length 0, and repeated frames give none of their own.
-    ``options``: see ``defaults.SampleOptions``.
+    ``options``: see ``defaults.SampleOptions``; of forces that the log's metadata call reconstructed, the noise that
+    these tell goes before their defaults.
     Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one whose lengths and velocities are not in
     metres, ``InvalidInput`` for a history of another log and for bad options.
     """
-    chosen = choose_options(SampleOptions, options)
+    chosen = choose_options(SampleOptions, {**log.of_samples, **options})
     if not log.is_scaled:
         raise UnknownScale("friction samples need velocities in m/s, and the log's scale is unknown")
     if log.force is None:

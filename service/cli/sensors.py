@@ -59,7 +59,11 @@ def describe(
     young_modulus: Annotated[float, typer.Option(help="Young's modulus of the gel, Pa.")],
     poisson_ratio: Annotated[float, typer.Option(help="Poisson's ratio of the gel.")],
     thickness: Annotated[
-        float | None, typer.Option(help="Surface to rigid base, m; without it the gel is thick against any contact.")
+        float | None,
+        typer.Option(
+            help="Surface to rigid base, m, at least a tenth of the markers' distance; without it, or inf: thick "
+            "against any contact."
+        ),
     ] = None,
     marker_depth: Annotated[float, typer.Option(help="Of the markers below the surface, m.")] = 0.0,
     relative_thickness: Annotated[
@@ -89,7 +93,10 @@ def calibrate(
     logs: Annotated[list[Path], typer.Argument(help="Logs of a body pressed straight down on the sensor, and lifted.")],
     known_force: Annotated[
         list[float] | None,
-        typer.Option(help="Normal force with which the body pressed, N: one of all logs, or given once for each."),
+        typer.Option(
+            help="Normal force with which the body pressed, N: one of all logs, or given once for each; "
+            "else what their grippers report."
+        ),
     ] = None,
     scale: Scale = None,
     frame_rate: FrameRate = None,

@@ -11,7 +11,7 @@ from slipcore.calibration.gain import gain
 from slipcore.calibration.kernel import kernel_width, squared_width
 from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
-from slipcore.calibration.press import InvalidPress, PressLog, find_press, known_forces, press_fault
+from slipcore.calibration.press import InvalidPress, PressLog, check_kinds, find_press, known_forces, press_fault
 from slipcore.calibration.zero import Zero, drifts, offsets
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.frames import FloatArray, GraspLog
@@ -20,10 +20,12 @@ from slipcore.frames import FloatArray, GraspLog
 def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None = None) -> SensorModel:
     """What is wrong with a sensor, from logs of a body pressed straight down on it and lifted.
 
-    ``known_force``: for each log the total normal force of its hold, N, or None. Each quantity has its interval, or
-    says why it is not identified. Raises ``InvalidInput`` for logs of several sensors or lattices, ``UnknownScale`` for
-    lengths that are not in metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
+    ``known_force``: for each log the total normal force of its hold, N, or None: then what the log's gripper reports,
+    if it does. Each quantity has its interval, or says why it is not identified. Raises ``InvalidInput`` for what are
+    no such forces or logs, and for logs of several sensors or lattices, ``UnknownScale`` for lengths that are not in
+    metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
     """
+    check_kinds(logs)
     _check_alike(logs)
     known = known_forces(logs, known_force)
     presses = [find_press(log) for log in logs]

@@ -45,6 +45,8 @@ class EstimateDefaults(Options):
 
     confidence: Annotated[float, Option(0.5, 0.9999, "-", "customary")] = 0.95
     """Of intervals."""
+    force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
+    """Standard deviation of a force that a gripper reports over it, where the log states none."""
     free_frames: Annotated[int, Option(2, 10_000, "frames", "a third of a second at 30 fps")] = 10
     """Least frames without contact from which an offset is known."""
     sideways_stiffness: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67

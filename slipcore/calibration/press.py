@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from slipcore.arguments import number, of_kind, shown
 from slipcore.calibration.defaults import PRESS
 from slipcore.calibration.zero import Zero, elapsed, find_zero
 from slipcore.defaults import DEVIATION_TO_SIGMA, LIMITS
@@ -28,26 +29,45 @@ class InvalidPress(InvalidInput):
         return type(self), (self.evidence,)
 
 
+def check_kinds(logs: Sequence[GraspLog]) -> None:
+    """Raises ``InvalidInput`` for what is no list of logs, and for one without any."""
+    if isinstance(logs, GraspLog) or not isinstance(logs, Sequence):
+        raise InvalidInput("logs", shown(logs), "a list of logs")
+    if not logs:
+        raise InvalidInput("logs", "none", "at least one press")
+    for log in logs:
+        of_kind("logs", log, GraspLog)
+
+
 def known_forces(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None) -> list[float | None]:
     """The normal force of each press, N, None where it is not known; ``known_force`` of None: of none.
 
     Raises ``InvalidInput`` without logs, for a press that is there twice, which would count as two that agree, where
     there are more or fewer forces than logs, and for one out of range.
     """
-    if not logs:
-        raise InvalidInput("logs", "none", "at least one press")
-    for number, log in enumerate(logs):
-        same = next((k for k in range(number) if _is_same(log, logs[k])), None)
+    check_kinds(logs)
+    for at, log in enumerate(logs):
+        same = next((k for k in range(at) if _is_same(log, logs[k])), None)
         if same is not None:
-            raise InvalidInput("logs", f"number {number + 1}, the same press as number {same + 1}", "each press once")
-    known: list[float | None] = [None] * len(logs) if known_force is None else list(known_force)
+            raise InvalidInput("logs", f"number {at + 1}, the same press as number {same + 1}", "each press once")
+    if known_force is None:
+        return [None] * len(logs)
+    given = known_force.tolist() if isinstance(known_force, np.ndarray) else known_force
+    if not isinstance(given, list | tuple):
+        raise InvalidInput("known_force", shown(known_force), "a list of one force or None for each log, or None")
+    known = [None if force is None else _press_force(force) for force in given]
     if len(known) != len(logs):
         raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
-    least, most = LIMITS.press
-    for force in known:
-        if force is not None and not least <= force <= most:
-            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
     return known
+
+
+def _press_force(force: float) -> float:
+    least, most = LIMITS.press
+    allowed = f"{least:g} to {most:g} N"
+    value = number("known_force", force, allowed)
+    if not least <= value <= most:
+        raise InvalidInput("known_force", force, allowed)
+    return value
 
 
 def _is_same(log: GraspLog, other: GraspLog) -> bool:

@@ -7,6 +7,7 @@ leaves; "bound": stops what does not converge.
 from dataclasses import dataclass
 from typing import Annotated
 
+from slipcore.calibration import defaults as of_presses
 from slipcore.options import Option, Options
 
 
@@ -194,7 +195,7 @@ class ReconstructionDefaults(Options):
     a share of the largest."""
     force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "neighbours err together, and by no mean less")] = 20.0
     """Least normal force of an element's friction sample over its deviation: more than of a sensor's own forces."""
-    force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
+    force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "as of presses")] = of_presses.ESTIMATE.force_tolerance
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
     least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9
     """Taken for the largest given force where all are 0."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slipcore.arguments import number
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
@@ -37,7 +38,7 @@ class DisplacementData:
         axes = axes_seen(log.displacement) if log.sees_along_surface else (2,)
         if noise is None:
             noise = noise_of(log.time, log.displacement[..., slice(2) if log.sees_along_surface else slice(2, 3)])
-        check_noise(noise)
+        noise = checked_noise(noise)
         at_end = saturated(log.displacement, log.observed)
         return cls(*rows(log.displacement, seen_along(log.observed, at_end), axes), axes, noise, at_end)
 
@@ -88,10 +89,13 @@ def error(data: FloatArray, seen: BoolArray, noise: float) -> FloatArray:
     return np.where(seen, np.hypot(noise, RECONSTRUCTION.discretisation * largest), np.inf)
 
 
-def check_noise(noise: float) -> None:
-    """Raises ``InvalidInput`` for what is none."""
-    if not 0.0 <= noise < np.inf:
-        raise InvalidInput("noise", noise, "0 m or more, finite")
+def checked_noise(noise: float) -> float:
+    """Noise (m) of a marker's coordinate; raises ``InvalidInput`` for what is none."""
+    allowed = "0 m or more, finite"
+    value = number("noise", noise, allowed)
+    if not 0.0 <= value < np.inf:
+        raise InvalidInput("noise", noise, allowed)
+    return value
 
 
 def noise_of(time: FloatArray, displacement: FloatArray) -> float:

@@ -9,7 +9,16 @@ import pytest
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth, InvalidInput
 from slipcore.defaults import LIMITS
-from slipcore.frames import Frames, check_element_area, check_frame, check_normal, check_pose, check_position
+from slipcore.frames import (
+    Frames,
+    check_element_area,
+    check_frame,
+    check_mask,
+    check_normal,
+    check_pose,
+    check_position,
+    reported,
+)
 
 SHAPE = (4, 3, 5)
 
@@ -385,3 +394,15 @@ def test_a_deviation_at_either_end_of_its_range_is_taken(fields: dict[str, Any],
     assert GraspLog(**fields | {"gripper_force_deviation": bound}).gripper_force_deviation == bound
     beyond = bound * (1.01 if bound == LIMITS.gripper_force else 0.99)
     refused(fields, "gripper_force_deviation", gripper_force_deviation=beyond)
+
+
+def test_a_gripper_that_holds_nothing_reports_nothing() -> None:
+    least = LIMITS.gripper_deviation
+    found = reported(np.array([-1.0, 0.0, 0.9 * least, least, 2.0]))
+    assert np.isnan(found[:3]).all()
+    assert found[3:].tolist() == [least, 2.0]
+
+
+def test_a_mask_of_rows_of_different_lengths_is_named() -> None:
+    with pytest.raises(InvalidInput, match="observed is not an array"):
+        check_mask("observed", [[True], [True, False]], (2, 2))

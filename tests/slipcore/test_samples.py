@@ -161,6 +161,17 @@ def test_samples_lie_above_the_velocity_and_force_that_noise_makes(ramp: tuple[G
     assert samples.normal_force.min() > 19 * 2e-3
 
 
+def test_the_noise_that_a_log_tells_of_reconstructed_forces_is_taken(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    """As after a log that ``Reconstruction.apply`` gave was stored and read again."""
+    log, history = ramp
+    told = {"force": "reconstructed", "force_noise": "0.02", "force_to_noise": "6"}
+    reread = replace(log, metadata=told)
+    found, given = element_samples(reread, history), element_samples(log, history, force_noise=0.02, force_to_noise=6.0)
+    assert found.normal_force_noise == given.normal_force_noise == pytest.approx(0.02 / np.sqrt(2.0))
+    np.testing.assert_array_equal(found.friction_coefficient, given.friction_coefficient)
+    assert element_samples(reread, history, force_noise=1e-3).normal_force_noise == pytest.approx(1e-3 / np.sqrt(2.0))
+
+
 def test_a_given_force_noise_takes_the_place_of_the_estimate(ramp: tuple[GraspLog, SlipHistory]) -> None:
     assert element_samples(*ramp).normal_force.min() < 0.1
     assert element_samples(*ramp, force_noise=20e-3).normal_force.min() > 0.1  # five times as much

@@ -29,8 +29,8 @@ from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.uneven import thickest
 from slipcore.forces.recording import DisplacementData, error
-from slipcore.forces.tracking.known import KnownForce, reported
-from slipcore.frames import FloatArray, GraspLog
+from slipcore.forces.tracking.known import KnownForce
+from slipcore.frames import FloatArray, GraspLog, reported
 
 GIVEN, PRIORS = "given", "the prior's: the presses hardly determine it"
 HALF_SPACE = "at least: against these contacts the gel may be as thick as a half-space"
@@ -103,8 +103,7 @@ def calibrate_gel(
     frames in which markers moved most. Raises ``InvalidInput`` for what does not fit, also for logs in which nothing
     touches, and ``UnknownScale`` for a log not in metres.
     """
-    uneven = None if relative_thickness is None else tuple(tuple(map(float, row)) for row in relative_thickness)
-    given = _checked(young_modulus, poisson_ratio, thickness, marker_depth, uneven)
+    given, uneven = _checked(young_modulus, poisson_ratio, thickness, marker_depth, relative_thickness)
     presses = _presses(logs, known_forces(logs, known_force), marker_depth, noise, uneven)
     if young_modulus is None and all(math.isnan(press.force) for press in presses.each):
         raise InvalidInput("known_force", "none", "at least one, a gripper's in a log, or a given young_modulus")
@@ -115,13 +114,19 @@ def calibrate_gel(
 
 
 def _checked(
-    young: float | None, ratio: float | None, thickness: float | None, depth: float, uneven: ThicknessMap | None
-) -> Elasticity:
-    """What is given, NaN where nothing is; raises ``InvalidInput`` for what no gel has."""
+    young: float | None,
+    ratio: float | None,
+    thickness: float | None,
+    depth: float,
+    uneven: Sequence[Sequence[float]] | None,
+) -> tuple[Elasticity, ThicknessMap | None]:
+    """What is given, NaN where nothing is, and the map; raises ``InvalidInput`` for what no gel has."""
     usual = GEL_CALIBRATION.first_ratio if ratio is None else ratio
     thick = math.inf if uneven is None else GEL.marker_depth / GEL.relative_thickness[0]  # more than any, and finite
-    Gel(1e6 if young is None else young, usual, thick if thickness is None else thickness, depth, uneven)
-    return Elasticity(math.nan if ratio is None else ratio, math.nan if thickness is None else 1.0 / thickness)
+    thickest_or_given = thick if thickness is None else thickness
+    gel = Gel(1e6 if young is None else young, usual, thickest_or_given, depth, uneven)  # type: ignore[arg-type]
+    closeness = math.nan if thickness is None else 1.0 / gel.thickness
+    return Elasticity(math.nan if ratio is None else gel.poisson_ratio, closeness), gel.relative_thickness
 
 
 def _presses(

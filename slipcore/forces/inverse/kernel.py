@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.errors import InvalidInput
+from slipcore.arguments import whole
 from slipcore.forces.inverse.fit import ObservationModel, TractionFit
 from slipcore.forces.recording import OUTWARD
 from slipcore.frames import FloatArray
@@ -33,8 +33,7 @@ class ResolutionKernel:
         One product of three vectors with the operator and one with the response; the dense kernel is never made.
         """
         n, m, _ = self.elements.shape
-        if not (0 <= row < n and 0 <= column < m):
-            raise InvalidInput("element", [row, column], f"one of {n} × {m}")
+        row, column = whole("row", row, 0, n - 1), whole("column", column, 0, m - 1)
         support, response = self.fit.support, self.observation.response
         borne = self.elements[row, column, support] / self.load
         by_data = np.stack([borne @ of_axis for of_axis in np.split(self.fit.operator, 3)])

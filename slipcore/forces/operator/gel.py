@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
-from numbers import Real
 from typing import Any
 
+from slipcore.arguments import number
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import GEL
 
@@ -57,8 +57,10 @@ class Gel:
         return self.thickness if rows is None else self.thickness * min(map(min, rows))
 
     def check_beside(self, pitch: float) -> None:
-        """Raises ``InvalidInput`` for a gel that is too thin for markers ``pitch`` m apart."""
-        least = GEL.thinness * pitch
+        """Raises ``InvalidInput`` for a gel that is too thin for markers ``pitch`` m apart; for no pitch, too."""
+        apart = number("pitch", pitch)
+        _check("pitch", apart, 0.0 < apart < math.inf, "above 0 m, finite")
+        least = GEL.thinness * apart
         allowed = f"{least:.3g} m or more, {GEL.thinness:g} of the distance between markers (is it in m?)"
         _check("thickness", self.thinnest, self.thinnest >= least, allowed)
 
@@ -84,20 +86,14 @@ class Gel:
 
 
 def _read(name: str, given: Any) -> Any:
+    if name == "thickness" and given is None:
+        return math.inf
     if name != "relative_thickness":
-        return _number(name, given)
+        return number(name, given)
     try:
-        return None if given is None else tuple(tuple(_number(name, value) for value in row) for row in given)
+        return None if given is None else tuple(tuple(number(name, value) for value in row) for row in given)
     except TypeError as error:
         raise InvalidInput(name, repr(given)[:60], "rows of one number a marker") from error
-
-
-def _number(name: str, given: object) -> float:
-    if given is None and name == "thickness":
-        return math.inf
-    if isinstance(given, bool) or not isinstance(given, Real):
-        raise InvalidInput(name, repr(given)[:60], "a number")
-    return float(given)
 
 
 def _check(name: str, value: float, allowed: bool, what: str) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slipcore.arguments import of_kind
 from slipcore.errors import InvalidInput, NoForces
 from slipcore.forces.reconstruction.whole_log import Reconstruction
 from slipcore.frames import FloatArray, GraspLog
@@ -40,6 +41,8 @@ def compare_forces(log: GraspLog, reconstruction: Reconstruction) -> ForceCompar
     Raises ``NoForces`` for a log without forces of its own, and ``InvalidInput`` where the reconstruction is of another
     log.
     """
+    of_kind("log", log, GraspLog)
+    of_kind("reconstruction", reconstruction, Reconstruction)
     if log.force is None:
         raise NoForces("forces are compared with a sensor's own, and the log has none")
     own, found = log.force, reconstruction.force

@@ -4,21 +4,23 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
+from types import NoneType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slipcore.arguments import number, of_kind, real_array
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM, STRENGTH
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.uneven import UnevenLayer
-from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows, seen_along
+from slipcore.forces.recording import axes_seen, checked_noise, moved, noise_of, rows, seen_along
 from slipcore.forces.tracking.frame_forces import FrameForces
-from slipcore.forces.tracking.known import KnownForce, contradicts, reported
+from slipcore.forces.tracking.known import KnownForce, contradicts
 from slipcore.forces.tracking.look import ContactTracking, MarkerReading, bytes_needed
 from slipcore.forces.tracking.sensor import SensorResponse
-from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
+from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask, reported
 from slipcore.saturation import RangeWatch
 
 
@@ -66,20 +68,22 @@ class ForceStream:
         noise: float | None = None,
         executor: Executor | None = None,
     ) -> None:
-        place = np.asarray(position, dtype=np.float64)
+        place = real_array("position", position).astype(np.float64)
         if place.ndim != 3 or place.shape[-1] != 3 or not np.isfinite(place).all():
             raise InvalidInput("position", f"of shape {list(place.shape)}", "finite, [n, m, 3] m")
-        if not 0.0 < element_area < np.inf:
+        area = number("element_area", element_area)
+        if not 0.0 < area < np.inf:
             raise InvalidInput("element_area", element_area, "above 0 m², finite")
-        if noise is not None:
-            check_noise(noise)
-        gel.check_beside(float(np.sqrt(element_area)))  # so that what does not fit is refused here, and not by a look
+        noise = None if noise is None else checked_noise(noise)
+        of_kind("gel", gel, Gel)
+        of_kind("executor", executor, Executor | NoneType)
+        gel.check_beside(float(np.sqrt(area)))  # so that what does not fit is refused here, and not by a look
         UnevenLayer.of(gel, place)
-        self.nodes = len(Nodes.around(place[..., :2].reshape(-1, 2), element_area))
+        self.nodes = len(Nodes.around(place[..., :2].reshape(-1, 2), area))
         """On which traction is sought: a look takes time with their cube, and memory with their square."""
-        self.held_bytes = bytes_needed(place, element_area)
+        self.held_bytes = bytes_needed(place, area)
         """At most, but for what the contact itself takes."""
-        self._position, self._area, self._gel, self._executor = place, element_area, gel, executor
+        self._position, self._area, self._gel, self._executor = place, area, gel, executor
         self._given, self._noise = noise, noise
         self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=FORCE_STREAM.frames)
         self._range = RangeWatch()
@@ -160,7 +164,8 @@ class ForceStream:
     def _checked(
         self, time: float, displacement: ArrayLike, observed: ArrayLike | None
     ) -> tuple[FloatArray, BoolArray | None]:
-        moved_by = np.asarray(displacement, dtype=np.float64)
+        time = number("time", time)
+        moved_by = real_array("displacement", displacement).astype(np.float64)
         if moved_by.shape != self._position.shape:
             raise InvalidInput("displacement", f"of shape {list(moved_by.shape)}", f"{list(self._position.shape)}")
         seen = None if observed is None else check_mask("observed", observed, moved_by.shape[:2])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slipcore.arguments import of_kind
 from slipcore.errors import InvalidInput
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.kernel import ResolutionKernel
@@ -15,11 +16,11 @@ from slipcore.forces.operator.gel import Gel
 from slipcore.forces.reconstruction.height import at_points
 from slipcore.forces.recording import DisplacementData, error, rows
 from slipcore.forces.tracking.frame_forces import FrameForces, Reader, TypicalDeviations
-from slipcore.forces.tracking.known import KnownForce, contradicts, reported
+from slipcore.forces.tracking.known import KnownForce, contradicts
 from slipcore.forces.tracking.over_time import ContactRun, runs
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
-from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, FloatArray, GraspLog
+from slipcore.frames import BY_FORCES, BY_MOTION, RECONSTRUCTED, BoolArray, FloatArray, GraspLog, reported
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,16 +72,17 @@ class Reconstruction(TypicalDeviations):
         return float(contradicts(self.contradiction).sum() / known.sum()) if known.any() else 0.0
 
     def apply(self, log: GraspLog) -> GraspLog:
-        """The log with these forces, which its metadata call reconstructed, and how unsure they are for a detector.
+        """The log with these forces, which its metadata call reconstructed, and how unsure they are for a detector and
+        for friction samples.
 
         Unless the log knows it, the contact is that which was found. Where markers do not show pressure no force is
         sure.
         """
-        if self.force.shape != log.displacement.shape:
-            raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
+        self._check_its_own(log)
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
         deviation = self.ratio_noise if self.shows_pressure else float(np.abs(self.force).max())
         about = {"force": RECONSTRUCTED, "force_deviation": f"{deviation:.4g}"}
+        about |= {name: f"{value:.4g}" for name, value in self.of_samples.items()}
         contact = log.contact
         if contact is None or log.metadata.get("contact") in (BY_MOTION, BY_FORCES):
             contact, about["contact"] = self.contact, BY_FORCES
@@ -88,7 +90,13 @@ class Reconstruction(TypicalDeviations):
 
     def for_samples(self, log: GraspLog) -> GraspLog:
         """The log that ``apply`` gave, as friction samples are to be collected from it: with forces averaged alike."""
+        self._check_its_own(log)
         return replace(log, force=self.alike)
+
+    def _check_its_own(self, log: GraspLog) -> None:
+        of_kind("log", log, GraspLog)
+        if self.force.shape != log.displacement.shape:
+            raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
 
 
 def reconstruct(
@@ -113,6 +121,10 @@ def reconstruct(
     is taken for the height of places, as maps show it, not of points of the gel.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
+    of_kind("log", log, GraspLog)
+    of_kind("gel", gel, Gel)
+    of_kind("criterion", criterion, str)
+    of_kind("over_time", over_time, bool)
     shown = DisplacementData.of(log, noise)
     sensor = SensorResponse.of(log.position, log.element_area, gel, shown.axes)
     name = "total_force"

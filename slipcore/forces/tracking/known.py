@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slipcore.defaults import LIMITS
+from slipcore.arguments import number, real_array
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.operator.gel import Gel
@@ -29,17 +29,16 @@ class KnownForce:
         """Of normal forces [t] N or forces [t, 3] N on the sensor, NaN where unknown; without a ``deviation`` N they
         are known to a share of each, and of the ``largest`` N there is or was before. Raises ``InvalidInput``.
         """
-        if deviation is not None and (total_force is None or not 0.0 < deviation < np.inf):
-            raise InvalidInput("total_force_deviation", deviation, "above 0 N and finite, beside total_force")
+        spread = None if deviation is None else _deviation(deviation, total_force is not None)
         total = np.full((frames, 3), np.nan)
         if total_force is not None:
-            force = np.asarray(total_force, dtype=np.float64)
+            force = real_array("total_force", total_force).astype(np.float64)
             if force.shape not in {(frames,), (frames, 3)} or np.isinf(force).any():
                 allowed = f"finite, [{frames}] or [{frames}, 3] N"
                 raise InvalidInput("total_force", f"of shape {list(force.shape)}", allowed)
             total[:, 2 if force.ndim == 1 else slice(3)] = force if force.ndim == 1 else force * OUTWARD
-        if deviation is not None:
-            return cls(total, np.full(total.shape, deviation))
+        if spread is not None:
+            return cls(total, np.full(total.shape, spread))
         size, share = np.abs(total), RECONSTRUCTION.force_tolerance
         most = np.nanmax(size, initial=max(largest, RECONSTRUCTION.least_force))
         return cls(total, share * np.maximum(size, share * most))
@@ -74,9 +73,13 @@ class KnownForce:
             raise InvalidInput(name, f"up to {largest:.3g} N", allowed)
 
 
-def reported(gripper_force: FloatArray) -> FloatArray:
-    """Normal forces N that a gripper reports, NaN where it does not grip."""
-    return np.where(gripper_force >= LIMITS.gripper_deviation, gripper_force, np.nan)
+def _deviation(deviation: float, has_force: bool) -> float:
+    """A standard deviation N, refused where it is none and where there is no force that it could be of."""
+    name, allowed = "total_force_deviation", "above 0 N and finite, beside total_force"
+    value = number(name, deviation, allowed)
+    if not has_force or not 0.0 < value < np.inf:
+        raise InvalidInput(name, deviation, allowed)
+    return value
 
 
 def contradicts(away: FloatArray) -> BoolArray:

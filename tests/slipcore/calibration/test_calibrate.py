@@ -251,6 +251,14 @@ def test_logs_that_do_not_belong_together_are_refused(ball: GraspLog) -> None:
         calibrate_sensor([ball], [1.0, 2.0])
     with pytest.raises(InvalidInput, match="1e-06 to 10000 N"):
         calibrate_sensor([ball], [0.0])
+    with pytest.raises(InvalidInput, match=r"logs is .*; allowed: a list of logs"):
+        calibrate_sensor(ball)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match=r"logs is 'ball'; allowed: GraspLog"):
+        calibrate_sensor(["ball"])  # type: ignore[list-item]
+    with pytest.raises(InvalidInput, match=r"known_force is 2.0; allowed: a list of one force"):
+        calibrate_sensor([ball], 2.0)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match=r"known_force is '2'; allowed: 1e-06 to 10000 N"):
+        calibrate_sensor([ball], ["2"])  # type: ignore[list-item]
     with pytest.raises(UnknownScale):
         calibrate_sensor([replace(ball, metadata={"scale": "unknown"})])
 

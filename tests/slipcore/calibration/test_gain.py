@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.gain import gain
 from slipcore.calibration.press import PressLog, find_press
@@ -42,8 +43,34 @@ def test_a_drift_that_one_side_leaves_open_is_in_what_more_presses_do_not_averag
     assert both.shared == 0.0
 
 
+def gripped(reading: np.ndarray, deviation: float | None = None) -> PressLog:
+    """A press of 2 N by a sensor that tells half of it, and what the gripper reported."""
+    told = straight(newton=1.0)
+    return find_press(replace(told, gripper_force=reading, gripper_force_deviation=deviation))
+
+
+def test_without_a_known_force_the_grippers_is_taken_as_well_as_it_is_known() -> None:
+    found, stated = gain(gripped(2.0 * LOAD), None), gain(gripped(2.0 * LOAD, 0.1), None)
+    assert isinstance(found, PressEstimate)
+    assert isinstance(stated, PressEstimate)
+    assert found.value == pytest.approx(2.0, rel=1e-12)
+    assert found.shared == pytest.approx(2.0 * ESTIMATE.force_tolerance)
+    assert stated.shared == pytest.approx(2.0 * 0.1 / 2.0)
+
+
+def test_only_frames_in_which_the_gripper_reports_count_and_a_known_force_goes_first() -> None:
+    late = np.where(np.arange(len(LOAD)) > 18, 2.0 * LOAD, 0.0)
+    found = gain(gripped(late), None)
+    assert isinstance(found, PressEstimate)
+    assert found.value == pytest.approx(2.0, rel=1e-12)
+    known = gain(gripped(late, 0.1), 3.0)
+    assert isinstance(known, PressEstimate)
+    assert (known.value, known.shared) == (pytest.approx(3.0, rel=1e-12), 0.0)
+
+
 REFUSED: dict[str, tuple[PressLog, float | None]] = {
     "no total force is given": (press(), None),
+    "record the gripper's force": (gripped(0.0 * LOAD), None),
     "the log has no forces": (find_press(replace(straight(), force=None)), 2.0),
     "no frames without contact": (press(load=LOAD[14:24]), 2.0),
     "reaches the lattice's edge": (press(share=shares(5e-3)), 2.0),

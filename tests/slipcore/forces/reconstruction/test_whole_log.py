@@ -389,7 +389,11 @@ def test_the_log_tells_how_unsure_its_reconstructed_forces_are(with_depth: tuple
     again = replace(found, contact=np.zeros_like(found.contact)).apply(known)
     assert again.contact is not None
     assert not again.contact.any(), "of a log reconstructed before no contact is kept"
-    assert log.force_deviation == 0.0
+    assert (log.force_deviation, log.of_samples) == (0.0, {})
+    assert known.of_samples == pytest.approx(found.of_samples, rel=1e-3)
+    for told in ("no number", "-1", "nan", "inf", "1e9"):
+        assert replace(known, metadata={**known.metadata, "force_noise": told}).of_samples == {}
+    assert replace(known, metadata={**known.metadata, "force": "measured"}).of_samples == {}
     for told in ("no number", "-1", "nan", "inf"):
         assert replace(known, metadata={**known.metadata, "force_deviation": told}).force_deviation == 0.0
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from slipcore import InvalidInput
-from slipcore.defaults import LIMITS
 from slipcore.forces.operator.gel import Gel
-from slipcore.forces.tracking.known import KnownForce, contradicts, reported
+from slipcore.forces.tracking.known import KnownForce, contradicts
 
 
 @pytest.mark.parametrize("deviation", [0.0, -0.1, np.inf, np.nan])
@@ -65,10 +64,3 @@ def test_a_force_beyond_what_the_gel_bears_is_refused_with_the_bound() -> None:
     KnownForce.of(np.array([19.9]), None, 1).check("grip", gel, 2e-6)
     with pytest.raises(InvalidInput, match=r"grip is up to 20\.1 N; allowed: at most 20 N"):
         KnownForce.of(np.array([-20.1]), None, 1).check("grip", gel, 2e-6)
-
-
-def test_a_gripper_that_holds_nothing_reports_nothing() -> None:
-    least = LIMITS.gripper_deviation
-    found = reported(np.array([-1.0, 0.0, 0.9 * least, least, 2.0]))
-    assert np.isnan(found[:3]).all()
-    assert found[3:].tolist() == [least, 2.0]
