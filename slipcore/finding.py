@@ -14,6 +14,7 @@ SEVERITIES: dict[str, Severity] = {
     "another's calibration": "note",
     "another's gel": "note",
     "slow frames": "note",
+    "fast frames": "note",
     "no displacement": "note",
     "no contact": "note",
     "places for displacement": "warning",

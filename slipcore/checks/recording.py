@@ -39,11 +39,16 @@ def _without_contact(log: GraspLog) -> tuple[str, str]:
 
 
 def time_unit(seen: Subject) -> Iterator[Finding]:
-    """Frames too far apart for slip."""
+    """Frames too far apart for slip, or closer than those of any sensor."""
     interval = float(np.median(np.diff(seen.log.time)))
     if interval > seen.limits.longest_interval:
         evidence = f"frames lie {interval:.3g} s apart; slip passes an element within a tenth of a second"
         yield Finding("slow frames", evidence, "make sure that times are in s, not ms; record at 20 Hz or more")
+    if interval < seen.limits.shortest_interval:
+        rate, fastest = 1.0 / interval, 1.0 / seen.limits.shortest_interval
+        evidence = f"{rate:,.0f} frames a second; no tactile sensor takes more than {fastest:,.0f}"
+        remedy = "make sure that times are in s: seconds that are taken for ms (a mapping's `unit`) look so"
+        yield Finding("fast frames", evidence, remedy)
 
 
 def still_markers(seen: Subject) -> Iterator[Finding]:
@@ -159,8 +164,12 @@ def saturation(seen: Subject) -> Iterator[Finding]:
 
 
 def rest_in_contact(seen: Subject) -> Iterator[Finding]:
-    """A recording that begins after the touch."""
-    yield from begun_in_contact(seen.history.contact[0])
+    """A recording that begins after the touch: an element goes on touching. Noise, which is known only after a few
+    frames, lets others seem to touch in the first.
+    """
+    first = seen.history.contact[: seen.limits.least_rest]
+    if first.all(axis=0).any():
+        yield from begun_in_contact(first[0])
 
 
 def begun_in_contact(contact: BoolArray) -> Iterator[Finding]:

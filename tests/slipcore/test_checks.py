@@ -156,6 +156,7 @@ def with_leaning_normals(log: GraspLog, degrees: float) -> GraspLog:
 
 FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
+    "fast frames": lambda log: replace(log, time=1e-3 * log.time),
     "places for displacement": with_places,
     "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
     "no contact": lambda log: with_force(log, 1e-4 * np.asarray(log.force)),
@@ -541,6 +542,7 @@ def test_a_moment_is_a_load_on_several_elements_and_none_on_one(count: int) -> N
 
 def test_a_limit_can_be_moved_and_a_wrong_one_is_refused(long_ramp: GraspLog) -> None:
     assert "slow frames" in names(long_ramp, longest_interval=0.01)
+    assert "fast frames" in names(long_ramp, shortest_interval=0.1)
     with pytest.raises(InvalidInput, match="place_scatter"):
         names(long_ramp, place_scatter=-1.0)
 

@@ -18,6 +18,22 @@ def test_frames_are_slow_above_a_second_in_the_median(interval: float, said: str
     assert bool(said) == any(recording.time_unit(subject(log(time=time))))
 
 
+@pytest.mark.parametrize(("interval", "said"), [(2e-4, ""), (1e-4 / 3.0, "29,997 frames a second; no tactile sensor")])
+def test_frames_are_faster_than_any_sensor_under_a_fifth_of_a_millisecond(interval: float, said: str) -> None:
+    time = np.concatenate([[0.0], np.cumsum(np.full(19, 1.0001 * interval))])
+    assert told(recording.time_unit(subject(log(time=time)))).startswith(said)
+    assert bool(said) == any(recording.time_unit(subject(log(time=time))))
+
+
+def test_what_touches_in_the_first_frame_by_noise_alone_is_no_touch_before_it() -> None:
+    """Until noise is known, after three frames, other elements of a small array may seem to touch in each frame."""
+    contact = np.zeros((20, 4, 3), bool)
+    contact[0, 0] = contact[1:6, 1] = True
+    assert not any(recording.rest_in_contact(subject(log(), contact)))
+    contact[1:4, 0, 0] = True
+    assert told(recording.rest_in_contact(subject(log(), contact))) == "3 elements touch in the first frame"
+
+
 def test_markers_are_still_that_stay_where_they_are_though_not_at_zero() -> None:
     assert told(recording.still_markers(subject(log(1e-4)))) == "no marker ever moves"
     assert not any(recording.still_markers(subject(log(FORWARD))))
