@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.arguments import check_kind, check_number, check_whole
 from estimators.defaults import ALARM, CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -54,19 +55,16 @@ class ChangeAlarm:
         scatter_prior: ScatterPrior = WEAK,
     ) -> "ChangeAlarm":
         """An alarm that has seen no grasp; raises ``InvalidSamples`` for settings that cannot be."""
-        for name, value, right, allowed in (
-            ("rate", rate, 0.0 < rate < 1.0, "above 0 and below 1"),
-            ("shift", shift, 0.0 < shift < math.inf, "above 0"),
-            ("reference", reference, reference >= 1, "at least 1"),
-        ):
-            if not right:
-                raise InvalidSamples(name, value, allowed)
+        check_number("rate", rate, lambda value: 0.0 < value < 1.0, "above 0 and below 1")
+        check_number("shift", shift, lambda value: 0.0 < value < math.inf, "above 0")
+        check_whole("reference", reference, 1)
+        check_kind("scatter_prior", scatter_prior, ScatterPrior)
         return cls(rate, shift, reference, scatter_prior=scatter_prior)
 
     def step(self, level: float, variance: float) -> "ChangeAlarm":
         """The alarm after one more grasp; see ``grasp_level``."""
-        if not (math.isfinite(level) and 0.0 <= variance < math.inf):
-            raise InvalidSamples("level and variance", (level, variance), "finite, the variance at least 0")
+        check_number("level", level, math.isfinite, "finite")
+        check_number("variance", variance, lambda value: 0.0 <= value < math.inf, "finite, at least 0")
         levels, variances = (*self.levels, level), (*self.variances, variance)
         return replace(self, levels=levels[-ALARM.longest :], variances=variances[-ALARM.longest :])
 
@@ -112,8 +110,10 @@ def noticeable(alarm: ChangeAlarm, grasps: int = ALARM.soon) -> float:
 
     These are taken to scatter as the last ones do. 1 where no fall would; raises ``InvalidSamples`` without grasps.
     """
-    if not alarm.levels or grasps < 1:
-        raise InvalidSamples("grasps", min(len(alarm.levels), grasps), "at least 1, and one or more before")
+    check_kind("alarm", alarm, ChangeAlarm)
+    check_whole("grasps", grasps, 1)
+    if not alarm.levels:
+        raise InvalidSamples("grasps", 0, "at least 1, and one or more before")
     last = np.resize(alarm.levels[-grasps:], grasps)
     coming = last - last.mean() + np.mean(alarm.levels)
     variances = (*alarm.variances, *np.resize(alarm.variances[-grasps:], grasps).tolist())

@@ -1,11 +1,13 @@
 """Whether single samples still follow a model: a sequential test. ``change_alarm`` tests whole grasps."""
 
+import math
 import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import special
 
+from estimators.arguments import check_kind, check_number, check_whole
 from estimators.defaults import CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -33,12 +35,10 @@ class ChangeDetector:
     count: int = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.alarm < 1.0:
-            raise InvalidSamples("alarm", self.alarm, "above 0 and below 1")
-        if not self.spread > 0.0:
-            raise InvalidSamples("spread", self.spread, "above 0")
-        if self.reset_after < 1:
-            raise InvalidSamples("reset_after", self.reset_after, "at least 1")
+        check_kind("model", self.model, FrictionModel)
+        check_number("alarm", self.alarm, lambda value: 0.0 < value < 1.0, "above 0 and below 1")
+        check_number("spread", self.spread, lambda value: 0.0 < value < math.inf, "above 0")
+        check_whole("reset_after", self.reset_after, 1)
 
     @property
     def e_value(self) -> float:
@@ -74,11 +74,13 @@ class ChangeDetector:
     def _deviation(self, v: float, f_n: float, mu: float) -> float:
         """Normal score of a sample in the model's predictive distribution, which allows for uncertain coefficients."""
         model = self.model
+        for name, value in (("tangential_velocity", v), ("normal_force", f_n), ("friction_coefficient", mu)):
+            check_number(name, value, math.isfinite, "a finite number")
         x = np.array([1.0, v, f_n])
         spread = float(np.sqrt(model.scale**2 + x @ model.covariance @ x))
         freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
         deviation = (mu - float(x @ model.coefficients)) / max(spread, np.finfo(float).tiny)
         if not np.isfinite(deviation):
-            raise InvalidSamples("sample", (v, f_n, mu), "finite numbers")
+            raise InvalidSamples("sample", (v, f_n, mu), "numbers of a usual size")
         score = special.ndtri(special.stdtr(freedom, -abs(deviation)))
         return float(np.copysign(min(-score, CHANGE.farthest), deviation))

@@ -1,10 +1,13 @@
 """The one entrance: samples in, friction model out."""
 
 from dataclasses import replace
+from types import NoneType
 
+from estimators.arguments import check_kind, check_number, check_whole
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
+from estimators.linear.m_estimate import LOSSES
 from estimators.linear.priors import ScatterPrior
 from estimators.method_names import METHODS, SCATTER_METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
@@ -16,8 +19,10 @@ def needs_samples(method: str, grasps: int) -> bool:
     """Whether a ``method``, by default options, fits so many grasps from less than their samples worse than from them.
 
     Moments hold exactly what a grasp and its places share. Least squares and the Bayesian default look at the elements
-    of a single grasp, which they take from its samples.
+    of a single grasp, which they take from its samples. Raises ``InvalidSamples`` for an unknown method.
     """
+    check_method(method)
+    check_whole("grasps", grasps, 0)
     return method not in {"conjugate", "hierarchical"} and (grasps < 2 or method not in {"ols", "bayes"})
 
 
@@ -25,7 +30,7 @@ def check_method(method: str) -> None:
     """Raises ``InvalidSamples`` for a ``method`` that ``fit`` does not have: before samples are found, which takes
     long.
     """
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InvalidSamples("method", method, ", ".join(METHODS))
 
 
@@ -59,8 +64,13 @@ def fit(
     """
     check_method(method)
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
-        if value is not None and not value > 0.0:
-            raise InvalidSamples(name, value, "above 0")
+        if value is not None:
+            check_number(name, value, lambda found: found > 0.0, "above 0")
+    check_whole("seed", seed, 0)
+    check_kind("likelihood", likelihood, str | NoneType)
+    check_kind("scatter_prior", scatter_prior, ScatterPrior | NoneType)
+    if not isinstance(loss, str) or loss not in LOSSES:
+        raise InvalidSamples("loss", loss, ", ".join(LOSSES))
     if likelihood is not None and method != "bayes":
         raise InvalidSamples("likelihood", likelihood, f'none with method "{method}", only with "bayes"')
     if scatter_prior is not None and (method not in SCATTER_METHODS or likelihood not in {None, "hierarchical"}):

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
-from stiction_client.linear_friction import LinearFriction, Scale, Scales, SensorFriction, SensorScale
+from stiction_client.linear_friction import (
+    FORCES,
+    VELOCITIES,
+    LinearFriction,
+    Scale,
+    Scales,
+    SensorFriction,
+    SensorScale,
+)
 from stiction_client.model import Cost
 from stiction_client.support import Domain
 
@@ -34,6 +42,7 @@ class FrictionModel(LinearFriction):
     """
 
     refusal: ClassVar[type[ValueError]] = InvalidSamples
+    velocities: ClassVar[tuple[float, float, str]] = (0.0, FORCES[1], VELOCITIES[2])  # as samples may have
 
     method: str
     coefficients: FloatArray

@@ -5,15 +5,18 @@ grasps that a robot can make, the one after which the friction at the planner's 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.arguments import check_kind, check_number, check_whole
 from estimators.defaults import DESIGN, IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel, Scales
+from slipcore.arguments import shown
 
 FloatArray = NDArray[np.float64]
 
@@ -28,6 +31,24 @@ SPEEDS, LENGTHS = DESIGN.least_speed * 2.0 ** np.arange(4), DESIGN.least_length 
 """Of a probe's slip, m/s and m, that a robot may choose unless another is given."""
 
 
+def _above_zero(value: float) -> bool:
+    return 0.0 < value < math.inf
+
+
+def _not_below_zero(value: float) -> bool:
+    return 0.0 <= value < math.inf
+
+
+def _check_ends(name: str, ends: object, allowed: str) -> None:
+    """Raises ``InvalidSamples`` for what are no two numbers above 0, the least first."""
+    if not isinstance(ends, Sequence) or len(ends) != 2:
+        raise InvalidSamples(name, shown(ends), allowed)
+    for end in ends:
+        check_number(name, end, _above_zero, allowed)
+    if ends[0] > ends[1]:
+        raise InvalidSamples(name, shown(ends), allowed)
+
+
 @dataclass(frozen=True, slots=True)
 class WorkingPoint:
     """What a planner asks of friction: the ``quantile`` of a contact of so many ``elements`` at an element's normal
@@ -40,14 +61,10 @@ class WorkingPoint:
     elements: int = DESIGN.elements
 
     def __post_init__(self) -> None:
-        for name, value, allowed in (
-            ("normal_force", 0.0 < self.normal_force < math.inf, "N an element, above 0"),
-            ("tangential_velocity", 0.0 <= self.tangential_velocity < math.inf, "m/s, at least 0"),
-            ("quantile", 0.0 < self.quantile < 0.5, "above 0 and below 0.5"),
-            ("elements", self.elements >= 1, "at least 1"),
-        ):
-            if not value:
-                raise InvalidSamples(name, getattr(self, name), allowed)
+        check_number("normal_force", self.normal_force, _above_zero, "N an element, above 0")
+        check_number("tangential_velocity", self.tangential_velocity, _not_below_zero, "m/s, at least 0")
+        check_number("quantile", self.quantile, lambda value: 0.0 < value < 0.5, "above 0 and below 0.5")
+        check_whole("elements", self.elements, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,20 +91,22 @@ class Probing:
 
     def __post_init__(self) -> None:
         for name, unit in (("speed", "m/s"), ("length", "m")):
-            values = getattr(self, name)
-            if not values or not all(0.0 < value < math.inf for value in values):
-                raise InvalidSamples(name, values, f"one or more, each above 0 {unit}")
-        for name, value, allowed in (
-            ("seconds", 0.0 <= self.seconds < math.inf, "s, at least 0"),
-            ("frame_rate", 0.0 < self.frame_rate < math.inf, "1/s, above 0"),
-            ("load", 0.0 <= self.load < math.inf, "N, at least 0"),
-            ("drop_probability", 0.0 < self.drop_probability <= 0.5, "above 0, at most 0.5"),
-            ("slipping", 0.0 < self.slipping <= 1.0, "a part of the contact, above 0 and at most 1"),
-            ("force_spread", 0.0 <= self.force_spread < math.inf, "a part of the mean, at least 0"),
-            ("velocity_spread", 0.0 <= self.velocity_spread < math.inf, "a part of the mean, at least 0"),
-        ):
-            if not value:
-                raise InvalidSamples(name, getattr(self, name), allowed)
+            values, allowed = getattr(self, name), f"one or more, each above 0 {unit}"
+            if not isinstance(values, Sequence) or not values:
+                raise InvalidSamples(name, shown(values), allowed)
+            for value in values:
+                check_number(name, value, _above_zero, allowed)
+        if self.normal_force is not None:
+            _check_ends("normal_force", self.normal_force, "N an element, above 0, the least first")
+        check_number("seconds", self.seconds, _not_below_zero, "s, at least 0")
+        check_number("frame_rate", self.frame_rate, _above_zero, "1/s, above 0")
+        check_number("load", self.load, _not_below_zero, "N, at least 0")
+        half = (lambda value: 0.0 < value <= 0.5), "above 0, at most 0.5"
+        check_number("drop_probability", self.drop_probability, *half)
+        part = (lambda value: 0.0 < value <= 1.0), "a part of the contact, above 0 and at most 1"
+        check_number("slipping", self.slipping, *part)
+        check_number("force_spread", self.force_spread, _not_below_zero, "a part of the mean, at least 0")
+        check_number("velocity_spread", self.velocity_spread, _not_below_zero, "a part of the mean, at least 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +136,13 @@ def next_grasp(
     """The grasp that most narrows friction at the working point per second of robot time.
 
     ``grasps`` made so far choose its direction, of which the law knows nothing: directions are spread evenly. Raises
-    ``InvalidSamples`` where no grasp that the robot can make bears its load.
+    ``InvalidSamples`` where no grasp that the robot can make bears its load, and for what are no such things.
     """
-    probing = probing or Probing()
+    probing = Probing() if probing is None else probing
+    check_kind("model", model, FrictionModel)
+    check_kind("working_point", working_point, WorkingPoint)
+    check_kind("probing", probing, Probing)
+    check_whole("grasps", grasps, 0)
     point = np.array([1.0, working_point.tangential_velocity, working_point.normal_force])
     variance = float(point @ model.covariance @ point)
     designs = Designs.of(_forces(model, working_point, probing), working_point.elements, probing)
@@ -242,8 +265,6 @@ def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing)
     """Mean normal forces of an element, N, at which a grasp bears the load, [f]."""
     asked, (least, most) = working_point.normal_force, model.domain.normal_force
     low, high = probing.normal_force or (min(0.5 * least if least > 0.0 else asked, asked), max(2.0 * most, asked))
-    if not 0.0 < low <= high < math.inf:
-        raise InvalidSamples("normal_force", (low, high), "N an element, above 0, the least first")
     forces = np.append(np.geomspace(low, high, DESIGN.forces), np.clip(working_point.normal_force, low, high))
     held = model.predict(0.0, forces, probing.drop_probability, "contact", working_point.elements)
     return np.asarray(forces[held * forces * working_point.elements >= probing.load])

@@ -15,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.arguments import check_kind
 from estimators.defaults import GRID, POPULATION
+from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel, Scale
 from estimators.linear.normal_mixture import matched_student
 from estimators.linear.priors import ScatterPrior
 from estimators.methods.reporting import ALONE
+from slipcore.arguments import shown
 
 FloatArray = NDArray[np.float64]
 
@@ -33,10 +36,14 @@ def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
     """The prior of scatter between grasps of a new material, by the ``models`` of others like it, one a material.
 
     Those count that have ``scales`` and were fitted to four grasps or more; without any it is the default. Their
-    order does not matter.
+    order does not matter. Raises ``InvalidSamples`` for what are no models.
     """
     weak = ScatterPrior()
-    known = [scale for model in models if (scale := told_scale(model)) is not None]
+    try:
+        given = list(models)
+    except TypeError:
+        raise InvalidSamples("models", shown(models), "a list of models") from None
+    known = [scale for model in given if (scale := told_scale(model)) is not None]
     if not known:
         return weak
     log = -weak.degrees_of_freedom * (np.log(SIZES) + 0.5 * (weak.scale / SIZES) ** 2)
@@ -51,6 +58,7 @@ def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
 
 def told_scale(model: FrictionModel) -> Scale | None:
     """What a model says of its scatter between grasps by the default prior; None of too few grasps."""
+    check_kind("models", model, FrictionModel)
     grasps = model.diagnostics.get("clusters") if model.diagnostics.get("cluster_kind") == "grasp" else None
     if model.scales is None or grasps is None or not float(grasps) >= POPULATION.fewest:
         return None

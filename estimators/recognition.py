@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.arguments import check_kind, check_number
 from estimators.defaults import GRID, RECOGNITION, REFERENCE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -16,6 +17,7 @@ from estimators.linear.least_squares import whole_triangle
 from estimators.linear.log_sum import log_sum
 from estimators.linear.place_errors import error_of_places
 from estimators.linear.unknown_velocity import offset_variance
+from slipcore.arguments import shown
 
 FloatArray = NDArray[np.float64]
 LogDensity: TypeAlias = Callable[[FloatArray], FloatArray]
@@ -46,12 +48,14 @@ def recognise(
     itself. ``prior``: weights of the materials, alike where None; ``unknown``: prior probability that it is none of
     them.
 
-    Raises ``InvalidSamples`` for no materials, one called "unknown", and a prior that does not fit them.
+    Raises ``InvalidSamples`` for no materials or models, one called "unknown", and a prior that does not fit them.
     """
+    check_kind("materials", materials, Mapping)
     if not materials or UNKNOWN in materials:
         raise InvalidSamples("materials", sorted(materials), f'at least one, none of them called "{UNKNOWN}"')
-    if not 0.0 <= unknown < 1.0:
-        raise InvalidSamples("unknown", unknown, "at least 0 and below 1")
+    for name, model in materials.items():
+        check_kind(f"model of {name}", model, FrictionModel)
+    check_number("unknown", unknown, lambda value: 0.0 <= value < 1.0, "at least 0 and below 1")
     data, belief = gather(samples), _belief(materials, prior)
     places = error_of_places(data)
     log = {name: belief[name] + np.log1p(-unknown) + _of_material(data, places, materials[name]) for name in materials}
@@ -105,9 +109,12 @@ def _integral(log_density: LogDensity, low: FloatArray, high: FloatArray) -> Flo
 
 
 def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] | None) -> dict[str, float]:
-    weight = dict.fromkeys(materials, 1.0) if prior is None else dict(prior)
-    if set(weight) != set(materials) or not all(value > 0.0 for value in weight.values()):
-        raise InvalidSamples("prior", prior, f"a weight above 0 for each of {sorted(materials)}")
+    allowed = f"a weight above 0 for each of {sorted(materials)}"
+    weight = dict.fromkeys(materials, 1.0) if prior is None else prior
+    if not isinstance(weight, Mapping) or set(weight) != set(materials):
+        raise InvalidSamples("prior", shown(prior), allowed)
+    for value in weight.values():
+        check_number("prior", value, lambda found: 0.0 < found < math.inf, allowed)
     total = sum(weight.values())
     return {name: float(np.log(value / total)) for name, value in weight.items()}
 

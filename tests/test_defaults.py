@@ -149,6 +149,7 @@ CLIENT_OTHER = {
     "controller/records.py": "permitted ranges",
     "elementwise.py": "how many quantiles are remembered, which changes no answer",
     "holding.py": "from how many entries on arrays shrink, and what is next to 0, which change no answer",
+    "linear_friction.py": "permitted ranges",
     "model.py": "the file format's name and version",
     "json_values.py": "rounding that a model may have when it is read, which changes no answer",
     "planner.py": "permitted ranges, and the default bound, an argument of the call",

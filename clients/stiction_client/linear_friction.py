@@ -2,7 +2,8 @@
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client import json_values
-from stiction_client.arguments import shown
+from stiction_client.arguments import number, shown, within
 from stiction_client.elementwise import FloatArray, Number, special, student_quantile
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import (
@@ -28,6 +29,9 @@ from stiction_client.support import (
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
+
+VELOCITIES, FORCES = (0.0, 1e3, "m/s, as a magnitude"), (0.0, 1e300, "N an element")
+"""At which velocities and normal forces a model may be asked."""
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""
@@ -173,6 +177,7 @@ class LinearFriction:
     __slots__ = ()
 
     refusal: ClassVar[type[ValueError]] = InvalidArgument
+    velocities: ClassVar[tuple[float, float, str]] = VELOCITIES
 
     method: str
     n: int
@@ -226,8 +231,8 @@ class LinearFriction:
         The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
         as root of squares (Graybill & Wang 1980): exact where all have the same degrees of freedom, and not too narrow
         in the tails where some have less. Outside the data the ``widening`` adds in the same way (``support.BEND``). No
-        quantile is below 0. Shapes broadcast. Raises ``refusal`` for a quantile outside (0, 1) and for a contact of no
-        elements.
+        quantile is below 0. Shapes broadcast. Raises ``refusal`` for what is no velocity or force, a quantile outside
+        (0, 1) and a contact of no elements.
         """
         count = self._averaged_elements(of, elements)
         v, f_n = np.broadcast_arrays(*self._point(tangential_velocity, normal_force))
@@ -265,6 +270,8 @@ class LinearFriction:
         that says whether its quantiles allow for the gain of any sensor; and where nobody noted which sensors its
         grasps are of, or its method does not separate them.
         """
+        if not isinstance(name, str):
+            raise self.refusal("name", shown(name), "the name of a sensor")
         scales = self.scales
         if scales is None or scales.between_sensors is None:
             return self if name == self.diagnostics.get(ONLY_SENSOR) else self._of_no_known_gain(name)
@@ -295,8 +302,7 @@ class LinearFriction:
 
         Raises ``refusal`` for an area that is not finite and above 0.
         """
-        if not (area > 0.0 and math.isfinite(area)):
-            raise self.refusal("area", area, "above 0 m²")
+        area = self._number("area", area, sys.float_info.min, "above 0 m²")
         part, (low, high) = area / self.element_area, self.domain.normal_force
         coefficients, covariance = _rescaled(self.coefficients, self.covariance, part)
         return replace(  # type: ignore[type-var]  # every model is a record
@@ -329,6 +335,7 @@ class LinearFriction:
         Slower than the data is not outside where these show how velocity changes friction: slip is never observed at
         rest, and a grasp that holds is the limit v → 0.
         """
+        self._point(tangential_velocity, normal_force, number)
         return extrapolation(self, tangential_velocity, normal_force)
 
     @property
@@ -341,6 +348,7 @@ class LinearFriction:
 
         ``stale``: why the model is not its material's any more, where the caller knows it and the model does not.
         """
+        self._point(tangential_velocity, normal_force, number)
         return support(self, tangential_velocity, normal_force, stale or self.stale)
 
     @property
@@ -387,9 +395,18 @@ class LinearFriction:
         errors = [*self.standard_errors.tolist(), self.scale / math.sqrt(2.0 * self.scatter_degrees_of_freedom)]
         return [(*each[:2], *each[2], each[3]) for each in zip(values, errors, bounds, identifiable, strict=True)]
 
-    def _point(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[Number, Number]:
-        """Velocity, m/s, and normal force, N an element, at which friction is asked for."""
-        return np.asarray(tangential_velocity, dtype=float), np.asarray(normal_force, dtype=float)
+    def _point(
+        self, tangential_velocity: ArrayLike, normal_force: ArrayLike, check: Callable[..., Number] = within
+    ) -> tuple[Number, Number]:
+        """Velocity, m/s, and normal force, N an element, at which friction is asked for; raises ``refusal`` for what is
+        no magnitude, by the ``check`` of each.
+        """
+        try:
+            return check("tangential_velocity", tangential_velocity, *self.velocities), check(
+                "normal_force", normal_force, *FORCES
+            )
+        except InvalidArgument as error:
+            raise self.refusal(error.name, error.value, error.allowed) from None
 
     def _check_probability(self, name: str, value: float) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < 1.0:
@@ -397,13 +414,18 @@ class LinearFriction:
 
     def _averaged_elements(self, of: str, elements: float | None) -> float:
         """Over how many elements the scatter of places averages out."""
-        if of not in KINDS:
+        if not isinstance(of, str) or of not in KINDS:
             raise self.refusal("of", of, " or ".join(KINDS))
         if of == "element":
             return 1.0
-        if elements is None or not 1.0 <= elements < math.inf:
-            raise self.refusal("elements", elements, "the number of elements of the contact, at least 1")
-        return float(elements)
+        return self._number("elements", elements, 1.0, "the number of elements of the contact, at least 1")
+
+    def _number(self, name: str, value: object, least: float, allowed: str) -> float:
+        """A finite number of ``least`` or more."""
+        is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not is_number or not least <= value <= sys.float_info.max:  # type: ignore[operator]
+            raise self.refusal(name, shown(value), allowed)
+        return float(value)  # type: ignore[arg-type]
 
 
 def check_model(model: object) -> None:

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from stiction_client import json_values
-from stiction_client.arguments import within
-from stiction_client.elementwise import FloatArray, Number
+from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
     LinearFriction,
@@ -20,9 +19,6 @@ from stiction_client.linear_friction import (
     degrees_to_json,
 )
 from stiction_client.support import CHOSEN_BECAUSE, OUTDATED, SUPERSEDED, Domain
-
-VELOCITIES, FORCES = (0.0, 1e3, "m/s, as a magnitude"), (0.0, 1e300, "N an element")
-"""At which velocities and normal forces a model may be asked."""
 
 FILE_FORMAT, FILE_VERSION = "stiction-friction-model", 1
 
@@ -165,9 +161,3 @@ class FrictionModel(LinearFriction):
     def stale(self) -> str | None:
         """Why this is not the material's model any more; None while it is."""
         return OUTDATED if self.outdated else None if self.current else SUPERSEDED
-
-    def _point(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[Number, Number]:
-        """``LinearFriction._point``; raises ``InvalidArgument`` for what is no magnitude."""
-        return within("tangential_velocity", tangential_velocity, *VELOCITIES), within(
-            "normal_force", normal_force, *FORCES
-        )

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.arguments import check_number, check_whole
 from estimators.defaults import POPULATION, PRIOR, REFERENCE, Prior
-from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
 from estimators.linear.normal_mixture import mixture_quantile
 
@@ -29,13 +29,11 @@ class ScatterPrior:
     materials: int = 0
 
     def __post_init__(self) -> None:
-        for name, value, right, allowed in (
-            ("scale", self.scale, 0.0 < self.scale < math.inf, "above 0 and finite"),
-            ("degrees_of_freedom", self.degrees_of_freedom, 1.0 <= self.degrees_of_freedom < math.inf, "1 or more"),
-            ("materials", self.materials, self.materials >= 0, "0 or more"),
-        ):
-            if not right:
-                raise InvalidSamples(f"{name} of the prior of scatter", value, allowed)
+        of = "of the prior of scatter"
+        check_number(f"scale {of}", self.scale, lambda value: 0.0 < value < math.inf, "above 0 and finite")
+        freedom = f"degrees_of_freedom {of}", self.degrees_of_freedom
+        check_number(*freedom, lambda value: 1.0 <= value < math.inf, "1 or more")
+        check_whole(f"materials {of}", self.materials, 0)
 
     def __str__(self) -> str:
         law = f"tau ~ half-Student-t on {self.degrees_of_freedom:.3g} degrees of freedom with scale {self.scale:.3g}"

@@ -3,7 +3,6 @@
 import time
 
 from estimators.defaults import ROBUST
-from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.coefficient_errors import of_any_grasp
@@ -19,8 +18,6 @@ def fit(data: FitData, loss: str = "tukey", seed: int = 0) -> FrictionModel:
 
     Raises ``NotConverged`` where the estimate does not settle.
     """
-    if loss not in LOSSES:
-        raise InvalidSamples("loss", loss, ", ".join(LOSSES))
     begin = time.perf_counter()
     found = m_estimate(data, data.raw("robust"), LOSSES[loss], seed)
     degrees = data.effective_n - 1.0 - found.linear.rank

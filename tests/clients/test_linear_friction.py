@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,6 +75,24 @@ def test_no_quantile_is_below_0_and_the_median_is_the_mean() -> None:
     assert replace(PLAIN, coefficients=np.array([-0.1, 0.0, 0.0])).predict(*INSIDE) == pytest.approx(-0.1)
 
 
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, "1", None, True, [True], [[1.0], [1.0, 2.0]], 1j])
+def test_what_is_no_velocity_or_force_is_named_by_all_that_is_asked_there(value: Any) -> None:
+    for point, name in (((value, 0.07), "tangential_velocity"), ((5e-4, value), "normal_force")):
+        for ask in (PLAIN.predict, PLAIN.extrapolation, PLAIN.support_at):
+            with pytest.raises(InvalidArgument, match=f"^{name} is .*; allowed: "):
+                ask(*point)
+
+
+def test_what_rests_on_data_is_asked_of_one_point() -> None:
+    with pytest.raises(InvalidArgument, match=r"^normal_force is .*; allowed: one number"):
+        PLAIN.support_at(0.0, np.ones(2))  # type: ignore[arg-type]
+
+
+def test_a_sensor_is_asked_for_by_its_name() -> None:
+    with pytest.raises(InvalidArgument, match=r"^name is 3; allowed: the name of a sensor$"):
+        PLAIN.of_sensor(3)  # type: ignore[arg-type]
+
+
 def test_shapes_broadcast() -> None:
     v, force = np.array([0.0, 5e-4])[:, None], np.array([0.03, 0.07, 0.1])
     found = SCALED.predict(v, force, 0.1)
@@ -117,8 +136,8 @@ def test_an_element_twice_as_large_bears_twice_the_force_and_averages_over_two_p
     assert scales.between_sensors.scale == Scale(0.15, 4.0)
 
 
-@pytest.mark.parametrize("area", [0.0, -1.0, math.inf, math.nan])
-def test_an_area_is_finite_and_above_0(area: float) -> None:
+@pytest.mark.parametrize("area", [0.0, -1.0, math.inf, math.nan, True, None])
+def test_an_area_is_finite_and_above_0(area: Any) -> None:
     with pytest.raises(InvalidArgument, match=f"area is {area}; allowed: above 0 m²"):
         PLAIN.at_element_area(area)
 

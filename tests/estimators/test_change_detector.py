@@ -72,7 +72,7 @@ def test_settings_out_of_range_are_refused(samples: Make, options: dict[str, flo
 
 
 def test_a_sample_that_is_no_number_is_refused(samples: Make) -> None:
-    with pytest.raises(estimators.InvalidSamples, match="sample"):
+    with pytest.raises(estimators.InvalidSamples, match="friction_coefficient is nan; allowed: a finite number"):
         ChangeDetector(estimators.fit(samples(50))).step(1e-3, 0.05, float("nan"))
 
 

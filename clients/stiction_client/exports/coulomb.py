@@ -9,8 +9,8 @@ from stiction_client.arguments import number, shown, whole
 from stiction_client.contacts import AREAS
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import check_model
-from stiction_client.model import FORCES, VELOCITIES, FrictionModel
+from stiction_client.linear_friction import FORCES, VELOCITIES, check_model
+from stiction_client.model import FrictionModel
 
 QUANTILE = 0.05
 """Default: nineteen observations of twenty have more friction."""
