@@ -14,7 +14,7 @@ import httpx
 
 from stiction_client import calls, head_timeout
 from stiction_client.address import authorization, checked, service_address
-from stiction_client.arguments import for_json, within
+from stiction_client.arguments import for_json, number
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import AnswerTooLarge, ConnectionFailed
 from stiction_client.exchange import Call, Ended, Pause, Reply, Request, T, advance
@@ -256,7 +256,7 @@ class FrictionClient:
         marker_depth: float = 0.0,
         relative_thickness: Sequence[Sequence[float]] | None = None,
     ) -> dict[str, Any]:
-        """Describe a sensor's gel (Pa, m; thickness None: a half-space), from which forces of its logs then follow.
+        """Describe a sensor's gel (Pa, m; thickness None or inf: a half-space); forces of its logs then follow.
 
         ``relative_thickness`` [n, m]: of one that is not alike thick everywhere, at each marker, over ``thickness``.
         """
@@ -570,12 +570,12 @@ class _Content:
 
 
 def _stale_after(seconds: float) -> float:
-    return float(within("stale_after", seconds, 0.0, math.inf, "s"))
+    return number("stale_after", seconds, 0.0, math.inf, "s")
 
 
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
     authorized = authorization(key)
-    timeout = float(within("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s"))
+    timeout = number("timeout", timeout, 0.0, LONGEST_TIMEOUT, "s")
     return {
         "base_url": service_address(url),
         "headers": {"Accept-Encoding": UNPACKED} | authorized,
@@ -631,7 +631,7 @@ def _gel(
     gel: dict[str, Any] = {
         "young_modulus": young_modulus,
         "poisson_ratio": poisson_ratio,
-        "thickness": thickness,
+        "thickness": None if thickness == math.inf else thickness,  # JSON has no infinity
         "marker_depth": marker_depth,
     }
     if relative_thickness is not None:  # which older services do not know

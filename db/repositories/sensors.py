@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from db.errors import NotFound
 from db.paging import BY_NAME, Window, windowed
 from db.records import Gel, Sensor
-from db.tables import GraspLogRow, SensorCalibrationRow, SensorRow
+from db.tables import GraspLogRow, SampleSummaryRow, SensorCalibrationRow, SensorRow
 from db.text import is_storable
 
 _NEWEST = (
@@ -68,6 +68,23 @@ def count_logs(session: Session, ids: Collection[int]) -> dict[int, int]:
     """How many logs, withdrawn ones too, come from each of these sensors that any comes from, by its key."""
     query = select(GraspLogRow.sensor_id, func.count()).where(GraspLogRow.sensor_id.in_(ids))
     return {int(row[0]): int(row[1]) for row in session.execute(query.group_by(GraspLogRow.sensor_id))}
+
+
+def element_area(session: Session, sensor_id: int) -> float | None:
+    """Area of its smallest elements, m², by the logs in which slip was looked for, else by its newest calibration; None
+    where neither is there.
+    """
+    by_logs = select(func.min(SampleSummaryRow.element_area)).join(GraspLogRow)
+    found = session.scalar(by_logs.where(GraspLogRow.sensor_id == sensor_id))
+    if found is not None:
+        return found
+    model = session.scalar(
+        select(SensorCalibrationRow.model)
+        .where(SensorCalibrationRow.sensor_id == sensor_id)
+        .order_by(SensorCalibrationRow.version.desc())
+        .limit(1)
+    )
+    return None if model is None else model.get("element_area")
 
 
 def describe(session: Session, name: str, gel: Gel, by: str | None = None) -> Sensor:

@@ -595,6 +595,13 @@ def test_a_key_that_is_no_text_is_named_by_its_type() -> None:
         FrictionClient("http://stiction", 3)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("given", [{"key": True}, {"key": b"stk_1"}, {"timeout": [1.0]}, {"stale_after": []}])
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+def test_settings_of_a_wrong_kind_are_named(client: Callable[..., object], given: dict[str, Any]) -> None:
+    with pytest.raises(InvalidArgument, match=f"^{next(iter(given))} is .*; allowed: "):
+        client("http://stiction", **given)
+
+
 def test_url_and_key_are_those_of_the_environment(
     answers: SimpleNamespace, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -637,6 +644,9 @@ def test_a_sensor_is_described_and_calibrated(ask: Ask, service: Service) -> Non
     assert (server.requests[0].method, json.loads(server.requests[0].content)) == ("PUT", gel)
     server = service({"name": "tac 1", "calibration": None})
     ask(server, "describe_sensor", "tac 1", 2e5, 0.48, 4e-3, 1e-3, ((1, 0.9), (0.8, 1)))
+    half_space = service({"name": "tac 1", "calibration": None})
+    ask(half_space, "describe_sensor", "tac 1", 2e5, 0.48, math.inf, 1e-3)
+    assert json.loads(half_space.requests[0].content) == gel
     uneven = gel | {"thickness": 4e-3, "relative_thickness": [[1.0, 0.9], [0.8, 1.0]]}
     assert json.loads(server.requests[0].content) == uneven
     server = service({"version": 2})

@@ -1,6 +1,7 @@
 """What commands on sensors send to a service, write and tell, without one."""
 
 import json
+import math
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -118,6 +119,11 @@ def test_sensors_are_told_to_a_program_as_the_service_has_them(client: Mock, cap
     client.sensors.return_value = [{"name": "left", "gel": None}]
     assert run("list", "--json") == 0
     assert json.loads(capsys.readouterr().out) == {"sensors": [{"name": "left", "gel": None}]}
+
+
+def test_an_infinitely_thick_gel_is_a_half_space(client: Mock) -> None:
+    assert run("describe", "pad", "--young-modulus", "2e5", "--poisson-ratio", "0.48", "--thickness", "inf") == 0
+    assert client.describe_sensor.call_args.args == ("pad", 2e5, 0.48, math.inf, 0.0, None)
 
 
 def test_a_map_of_the_thickness_is_read_from_a_file_and_told(client: Mock, capsys: Capture, tmp_path: Path) -> None:

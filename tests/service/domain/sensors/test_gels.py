@@ -7,8 +7,8 @@ import pytest
 
 from db.database import Database
 from db.paging import Window
-from db.records import AuditFilter, Gel
-from db.repositories import access_keys, audit
+from db.records import AuditFilter, Gel, NewCalibration
+from db.repositories import access_keys, audit, calibrations
 from db.repositories import sensors as stored
 from service.domain.access.principal import ANONYMOUS, Principal
 from service.domain.errors import InsufficientScope, InvalidValue, QuotaExceeded
@@ -48,6 +48,21 @@ def test_a_gel_is_described_by_whoever_uploads_and_again_by_an_admin(context: Co
         ("sensor.described", "left", 3e5),
         ("sensor.described", "right", 2e5),
     ]
+
+
+def test_a_gel_too_thin_for_its_markers_is_refused_where_their_distance_is_known(
+    context: Context, database: Database
+) -> None:
+    thin = Gel(2e5, 0.48, 1e-6, 0.0)
+    assert gels.describe(context, "new", thin, ANONYMOUS).gel == thin
+    with database.write() as session:
+        stored.find_or_add(session, "left")
+        calibrations.add(session, "left", NewCalibration((), {"element_area": 1e-6}, None, None))
+    with pytest.raises(InvalidValue, match=r"^thickness is 1e-06; allowed: 0\.0001 m or more, 0\.1 of the distance"):
+        gels.describe(context, "left", thin, ANONYMOUS)
+    assert gels.find(context, "left").gel is None
+    half_space = replace(thin, thickness=None)
+    assert gels.describe(context, "left", half_space, ANONYMOUS).gel == half_space
 
 
 def test_an_admin_who_says_the_same_vouches_for_a_description(context: Context, database: Database) -> None:
