@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from slipcore.defaults import PATCHES
-from slipcore.frames import GraspLog
+from slipcore.frames import FloatArray, GraspLog
 
 
 def warm_up(*methods: str) -> float:
@@ -22,17 +22,29 @@ def warm_up(*methods: str) -> float:
 def warm_up_detectors(*methods: str) -> None:
     """What a first frame waits for: the kernels of these methods, of all if none is named."""
     from slipcore.detection.batch import detect_slip
-    from slipcore.detection.detector import SlipDetector
     from slipcore.detection.methods import METHODS
 
-    axis = 1e-3 * np.arange(3.0)
-    position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
+    position = _position()
     force = np.broadcast_to([0.0, 0.0, -0.1], (PATCHES.least_frames, *position.shape))
     log = GraspLog(np.linspace(0.0, 0.3, len(force)), position, np.zeros(force.shape), element_area=1e-6, force=force)
     for method in methods or METHODS:
         detect_slip(log, method, lookahead=1)
-        detector = SlipDetector(position, log.element_area, method)
-        detector.step(0.0, log.displacement[0], force[0], normal=np.broadcast_to([0.0, 0.0, 1.0], position.shape))
+        warm_up_step(method)
+
+
+def warm_up_step(method: str) -> None:
+    """What the first frame of a stream waits for."""
+    from slipcore.detection.detector import SlipDetector
+
+    position = _position()
+    normal, force = (np.broadcast_to([0.0, 0.0, z], position.shape) for z in (1.0, -0.1))
+    SlipDetector(position, 1e-6, method).step(0.0, np.zeros(position.shape), force, normal=normal)
+
+
+def _position() -> FloatArray:
+    """Of markers on a small lattice, m."""
+    axis = 1e-3 * np.arange(3.0)
+    return np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
 
 
 def warm_up_samples() -> None:

@@ -38,6 +38,7 @@ from slipcore.checks.recording import begun_in_contact
 from slipcore.defaults import FilterOptions
 from slipcore.frames import check_displacement, check_gripper_report, check_span
 from slipcore.method_choice import method_with_displacement
+from slipcore.warm_up import warm_up_step
 from stiction_client import container
 
 MAX_KEPT_BYTES = 64 * 2**20
@@ -52,6 +53,20 @@ _SESSIONS: dict[str, DetectorSession] = {}
 
 class FitInProgress(Exception):
     """A session's next look for friction is due, and its last one not done: the frame may come again in a moment."""
+
+
+def methods_of(method: str | None, grid: tuple[int, int]) -> tuple[str, str]:
+    """By which slip may be found on so many markers, in frames without forces and with them."""
+    without, with_forces = (method or method_with_displacement(grid, measures) for measures in (False, True))
+    return without, with_forces
+
+
+def prepare(*methods: str) -> None:
+    """Load the kernels that first frames wait for by these methods, or compile them, which takes minutes; raises
+    ``InvalidInput`` for a method that there is not.
+    """
+    for method in dict.fromkeys(methods):
+        warm_up_step(method)
 
 
 def open_session(
@@ -76,7 +91,7 @@ def open_session(
     at_rest = _array("position", position, (rows, columns, 3))
     held = WINDOW * 3 * at_rest.nbytes  # of the frames that are looked at, each with forces and normals
     _check_room(held, limit)
-    without, with_forces = (method or method_with_displacement((rows, columns), measures) for measures in (False, True))
+    without, with_forces = methods_of(method, (rows, columns))
     detector, moments = slipcore.SlipDetector(at_rest, area, without), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model, materials)

@@ -20,7 +20,7 @@ from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
 from service.stream.detector_session import MemoryLimit, PackedFrame, SessionOptions
-from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
+from service.stream.errors import DETECTOR_LOST, IN_USE, NOT_READY, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.live_frame import pack_end
 from service.stream.messages import Open, packed
 
@@ -39,6 +39,9 @@ LOGS_AT_ONCE, LOGS_OF_ONE = 2, 1
 
 TAKE_OVER_SECONDS = 5.0
 """s that the connection before may take to let go of a session with which another one goes on."""
+
+PREPARE_SECONDS = 25.0
+"""s that a session waits for the kernels of its detector: longer than loading them, and shorter than clients wait."""
 
 LEAST_PAUSE, MOST_PAUSE = 0.005, 0.1
 """s until a frame that came too fast is tried again."""
@@ -109,6 +112,7 @@ class Streams:
         self._starting = asyncio.Lock()
         self._sessions: dict[str, Session] = {}
         self._dropping: set[asyncio.Task[None]] = set()
+        self._preparing: dict[tuple[str, ...], asyncio.Task[None]] = {}
         self._watchers = Watchers()
         self._turns = UnboundedFairQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
         self._logs = UnboundedFairQueue(LOGS_AT_ONCE, "written", share=LOGS_OF_ONE)
@@ -125,13 +129,15 @@ class Streams:
         """A new session; ``model``: what a grip controller that was asked for begins with, ``materials``: what it
         recognises; ``gel``: of its sensor.
 
-        Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many.
+        Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many, and while
+        its detector is being compiled.
         """
         session = Session(uuid.uuid4().hex, opening, key_id, key_id or f"address {network_of(address)}")
         self._check_room(session.owner)
         position, opening.position = packed("position", opening.position), b""
         self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it
         try:
+            await self._prepare(detectors.methods_of(opening.detector, opening.grid))
             session.method = await self.ask(
                 session, detectors.open_session, position, opening.grid, opening.element_area, opening.detector,
                 opening.keep, MemoryLimit(session.owner, self._most_bytes),
@@ -142,6 +148,22 @@ class Streams:
             raise
         self.leave(session)
         return session
+
+    async def _prepare(self, methods: tuple[str, ...]) -> None:
+        """See that the process has the kernels of these methods; raises ``End`` where they are not there in time."""
+        preparing = self._preparing.get(methods)
+        if preparing is None:
+            preparing = asyncio.create_task(self.call(detectors.prepare, *methods, is_long=True))
+            preparing.add_done_callback(lambda done: done.cancelled() or done.exception())  # though nobody waits for it
+            self._preparing[methods] = preparing
+        await asyncio.wait({preparing}, timeout=PREPARE_SECONDS)
+        if not preparing.done():
+            raise End(NOT_READY, "the detector is being compiled, minutes after an installation; open again in 30 s")
+        try:
+            preparing.result()
+        except BaseException:
+            self._preparing.pop(methods, None)
+            raise
 
     def _check_room(self, owner: str) -> None:
         if len(self._sessions) >= MOST_SESSIONS:
@@ -267,6 +289,7 @@ class Streams:
         for session in self._sessions.values():
             session.broadcast.end(pack_end("The detector's process ended.", None))
         self._sessions.clear()
+        self._preparing.clear()
 
     async def _started(self) -> SideProcess:
         async with self._starting:
@@ -283,3 +306,4 @@ class Streams:
         """End the worker."""
         if self._process is not None:
             await self._process.stop()
+        await asyncio.gather(*self._preparing.values(), return_exceptions=True)

@@ -359,3 +359,11 @@ def test_a_stream_without_a_detector_has_that_of_the_log_that_it_becomes(tmp_pat
             answer, _ = detectors.step("one", make(log, k))
         assert detectors.write("one", tmp_path / "log.npz", "left").method == answer["detector"]
         detectors.drop("one")
+
+
+def test_what_a_first_frame_waits_for_is_prepared_by_the_methods_that_it_may_have() -> None:
+    assert detectors.methods_of(None, (3, 3)) == ("filter", "coarse")
+    assert detectors.methods_of("rigid_fit", (3, 3)) == ("rigid_fit", "rigid_fit")
+    detectors.prepare("rigid_fit", "rigid_fit")
+    with pytest.raises(InvalidInput, match="method is guess"):
+        detectors.prepare("guess")

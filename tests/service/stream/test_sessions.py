@@ -9,7 +9,7 @@ import pytest
 
 from service.processes.side_process import ProcessEnded
 from service.stream import detectors, sessions
-from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
+from service.stream.errors import DETECTOR_LOST, IN_USE, NOT_READY, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.messages import Open
 from service.stream.sessions import RecentAnswers, Session, Streams
 from tests.sleeping import replace_sleep
@@ -23,9 +23,15 @@ class Here(Streams):
         self.asked: list[tuple[Any, ...]] = []
         self.answer = answer
 
-    async def call(self, do: Callable[..., Any], *arguments: Any) -> Any:
+    async def call(self, do: Callable[..., Any], *arguments: Any, is_long: bool = False) -> Any:
+        if is_long:
+            return await self.compile(do, *arguments)
         self.asked.append((do, *arguments))
         return self.answer(do, *arguments)
+
+    async def compile(self, do: Callable[..., Any], *methods: str) -> None:
+        """At once, as of kernels that are kept."""
+        assert (do, methods) == (detectors.prepare, ("filter", "coarse"))
 
     async def begin(self, key_id: str | None = "key", address: str = "10.0.0.9") -> Session:
         opening: Any = Open(position=np.zeros((1, 2, 3)).tobytes(), grid=(1, 2), element_area=1e-6)
@@ -84,6 +90,54 @@ def test_a_sensor_that_cannot_be_leaves_no_session() -> None:
         with pytest.raises(ValueError, match="no sensor"):
             await streams.begin()
         assert streams.list_all() == []
+
+    run(steps())
+
+
+def test_who_opens_while_the_detector_is_compiled_is_told_so_and_can_open_once_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sessions, "PREPARE_SECONDS", 0.01)
+
+    class Compiling(Here):
+        compiled, begun = asyncio.Event(), 0
+
+        async def compile(self, *_: object) -> None:
+            self.begun += 1
+            await self.compiled.wait()
+
+    async def steps() -> None:
+        streams = Compiling()
+        for _ in range(2):
+            with pytest.raises(End, match=r"the detector is being compiled, .*; open again in 30 s") as ended:
+                await streams.begin()
+            assert (ended.value.code, streams.list_all()) == (NOT_READY, [])
+            assert len(ended.value.reason.encode()) <= 120, "a close frame holds no more"
+        assert [do for do, *_ in streams.asked if do is not detectors.drop] == []
+        streams.compiled.set()
+        session = await streams.begin()
+        assert streams.list_all() == [session]
+        assert streams.begun == 1
+        await streams.stop()
+
+    run(steps())
+
+
+def test_a_detector_that_could_not_be_prepared_is_prepared_anew() -> None:
+    class Failing(Here):
+        failed = 0
+
+        async def compile(self, *_: object) -> None:
+            self.failed += 1
+            if self.failed == 1:
+                raise End(DETECTOR_LOST, "the detector's process ended")
+
+    async def steps() -> None:
+        streams = Failing()
+        with pytest.raises(End, match="process ended"):
+            await streams.begin()
+        assert streams.list_all() == []
+        assert await streams.begin() in streams.list_all()
 
     run(steps())
 
