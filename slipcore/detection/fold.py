@@ -1,11 +1,13 @@
 """The steps of a compiled method over all frames of a log in one call: nothing comes from outside for a frame."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from inspect import unwrap
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.compilation import borrowed, compiled
+from slipcore.compilation import address_of, borrowed, call_at, compiled
 from slipcore.detection.filter.backward_pass import step_back
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.state import EXPECTED, PROBABILITY
@@ -13,7 +15,6 @@ from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.records import Memory, Plain, named
-from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -49,7 +50,7 @@ class Rings(NamedTuple):
 
 @compiled
 def fold(
-    is_filter: bool,
+    step: int,
     sensor: Plain,
     log: LogArrays,
     rings: Rings,
@@ -57,7 +58,8 @@ def fold(
     room: Plain,
     results: FrameResults,
 ) -> float:
-    """Fill ``results`` from the second frame on, by method "filter" or else "strain_rate"; marker noise at the end, m.
+    """Fill ``results`` from the second frame on, by the ``step`` of a method, of which this is ``address_of_step``;
+    marker noise at the end, m.
 
     ``rings`` hold the memory after the first frame. With a ``lookahead`` each frame is decided in the light of that
     many after it, for which the filter alone remembers enough. ``sensor`` and ``room`` are a ``DetectorSetup`` and
@@ -69,14 +71,21 @@ def fold(
         last, frame = frame_at(log, k - 1), frame_at(log, k)
         before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
         given = sensor, last, frame, before, after, room, results.velocity[k]
-        found = run_filter(*given) if is_filter else run_strain_rate(*given)
-        sigma, results.touching[k], results.slipping[k] = found
+        sigma, results.touching[k], results.slipping[k] = call_at(step, run_filter, given)
         if 0 < lookahead < k:
             revise(sensor, log, rings, k - lookahead, k, room, results)
     if lookahead > 0:
         for k in range(max(frames - lookahead, 1), frames):
             revise(sensor, log, rings, k, frames - 1, room, results)
     return sigma
+
+
+def address_of_step(
+    run: Callable[..., Any], sensor: Plain, log: LogArrays, rings: Rings, room: Plain, results: FrameResults
+) -> int:
+    """Where a method's compiled step is, which ``fold`` calls: together with that it would be compiled twice."""
+    frame, memory = unwrap(frame_at)(log, 0), unwrap(memory_at)(results, rings, 0)
+    return address_of(run, sensor, frame, frame, memory, memory, room, results.velocity[0])
 
 
 def rings_from(start: Memory, lookahead: int) -> Rings:

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.detection.detector import DetectorState, step
-from slipcore.detection.fold import FrameResults, LogArrays, fold, rings_from
-from slipcore.detection.methods import findings_by
+from slipcore.detection.fold import FrameResults, LogArrays, address_of_step, fold, rings_from
+from slipcore.detection.methods import find_method, findings_by
+from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, shared_workspace
 from slipcore.detection.sharpening import sharpened
 from slipcore.frames import BoolArray, FloatArray, GraspLog
@@ -24,13 +25,16 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     results.contact[0], results.slip[0], results.velocity[0] = memory.contact, memory.slip, first.velocity
     results.probability[0] = memory.probability
     results.touching[0], results.slipping[0] = memory.contact.sum(), memory.slip.sum()
-    is_filter = setup.method == "filter"
-    ahead = lookahead if is_filter else 0
+    method = find_method(setup.method)
+    assert isinstance(method, CompiledMethod)
+    ahead = lookahead if method.revise else 0
     room = shared_workspace(*memory.probability.shape)
     rings = rings_from(memory, ahead)
     displacement, force = sharpened(log.displacement, log.force, setup.options, setup.element_area)
     recording = _recording(log, displacement, force)
-    noise = fold(is_filter, tuple(setup.sensor), recording, rings, ahead, room, results)
+    sensor = tuple(setup.sensor)
+    address = address_of_step(method.run, sensor, recording, rings, room, results)
+    noise = fold(address, sensor, recording, rings, ahead, room, results)
     found = findings_by(setup.method, rings.common[(len(log) - 1) % 2], noise)
     return replace(_history(log, setup.method, noise, results), findings=found)
 

@@ -1,16 +1,18 @@
-"""Where compiled kernels are kept, and until when they count."""
+"""Where compiled kernels are kept and until when they count, what is left out of them, and how they call each other."""
 
 import importlib
 import os
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numba import config, njit
+from numba.core.caching import NullCache
 
 from slipcore import compilation
-from slipcore.compilation import borrowed
+from slipcore.compilation import address_of, borrowed, call_at, compiled
 
 KERNEL = """
 from slipcore.compilation import compiled
@@ -126,3 +128,90 @@ def test_what_is_borrowed_is_the_same_and_still_belongs_to_who_lent_it() -> None
     owners = sys.getrefcount(first), sys.getrefcount(second)
     assert [sum_of_borrowed((first, (second, 0.5))) for _ in range(3)] == [7.5] * 3
     assert (sys.getrefcount(first), sys.getrefcount(second)) == owners
+
+
+ROWS = """
+import numpy as np
+
+from slipcore.compilation import compiled
+
+
+@compiled
+def scaled(x: float) -> float:
+    rows = np.zeros((2, 3))
+    rows[1] = np.full(3, 2.0 * x)
+    return rows[1, 2]
+"""
+
+
+def test_a_kernel_that_fills_rows_holds_no_text_of_unequal_shapes(package: Path) -> None:
+    (package / "kernel.py").write_text(ROWS)
+    assert run() == (2.0, 1)
+    (kernel,) = (path.read_bytes() for path in package.rglob("*.nbc"))
+    assert b"refuse" in kernel
+    assert b"raise_with_shape_context" not in kernel
+    assert b"unicode" not in kernel
+
+
+@compiled
+def fill_first(rows: np.ndarray, row: np.ndarray) -> float:
+    rows[0] = row
+    return float(rows.sum())
+
+
+@njit  # type: ignore[untyped-decorator]
+def fill_first_of_numba(rows: np.ndarray, row: np.ndarray) -> None:
+    rows[0] = row
+
+
+def test_arrays_of_unequal_shapes_are_still_refused_and_numbas_own_kernels_say_which() -> None:
+    rows = np.zeros((2, 3))
+    assert fill_first(rows, np.ones(3)) == 3.0
+    with pytest.raises(ValueError, match="arrays of unequal shapes"):
+        fill_first(rows, np.ones(2))
+    with pytest.raises(ValueError, match=r"shape \(3,\) from input of shape \(2,\)"):
+        fill_first_of_numba(rows, np.ones(2))
+
+
+@compiled
+def fill_last(rows: np.ndarray, row: np.ndarray) -> float:
+    rows[-1] = row
+    return float(rows[-1].sum())
+
+
+@njit  # type: ignore[untyped-decorator]
+def fill_by(address: int, rows: np.ndarray, row: np.ndarray) -> float:
+    return float(call_at(address, fill_first, (rows, row)))
+
+
+def test_a_kernel_is_called_at_its_address_in_place_of_another_of_the_same_types() -> None:
+    rows, row = np.zeros((2, 3)), np.full(3, 2.0)
+    assert fill_by(address_of(fill_first, rows, row), rows, row) == 6.0
+    assert fill_by(address_of(fill_last, rows, row), rows, 2.0 * row) == 12.0
+    np.testing.assert_array_equal(rows, [[2.0] * 3, [4.0] * 3])
+
+
+def test_what_a_kernel_raises_at_its_address_comes_to_who_called_it() -> None:
+    rows, row = np.zeros((2, 3)), np.ones(2)
+    with pytest.raises(ValueError, match="arrays of unequal shapes"):
+        fill_by(address_of(fill_first, rows, row), rows, row)
+
+
+def test_an_address_is_that_for_the_types_of_arguments() -> None:
+    rows, row = np.zeros((2, 3)), np.ones(3)
+    found = address_of(fill_first, rows, row)
+    assert address_of(fill_first, 2.0 * rows, row) == found
+    row.flags.writeable = False
+    assert address_of(fill_first, rows, row) != found
+
+
+def test_an_address_is_another_once_a_kernel_was_compiled_anew() -> None:
+    @compiled
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    kernel, found = cast("Any", twice), address_of(twice, 1.0)
+    assert address_of(twice, 3.0) == found
+    kernel._reset_overloads()
+    kernel._cache = NullCache()
+    assert address_of(twice, 3.0) != found

@@ -60,7 +60,8 @@ class Start(NamedTuple):
 
 
 class CompiledMethod(NamedTuple, Generic[Options]):
-    """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
+    """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``; these take and
+    return the same types, as ``fold`` calls any of them by its address.
 
     ``revise``: the decision on a frame from the ``elements`` in its memory and in those of frames after it, and the
     settings; None for a method to which later frames say nothing. ``findings``: what its memory's ``common``, and the
