@@ -10,8 +10,9 @@ TAC3D := pytac3d==3.3.0.9 --hash=sha256:403db42faa530bf716d4acbb22ab3b51382750ed
 SHIPPED := $(CACHE)/shipped
 OUTPUT ?= demo-output
 FIRST := numpy|scipy|numba|llvmlite|setuptools
-# uv makes bytecode of what it installs at that moment alone; without it each process takes 3 s longer to start.
-BYTECODE := $(BIN)/python -m compileall -q $(addprefix $(VENV)/lib/python3*/site-packages/,numpy scipy numba llvmlite)
+# Without bytecode each process takes 3 s longer to start. uv would make it of the packages' own tests too, a quarter
+# of all, and only of what it installs at that moment. What cannot be compiled is nothing that runs here.
+BYTECODE := { $(BIN)/python -W ignore -m compileall -qq -j 0 -x /tests/ $(VENV)/lib || true; }
 CONTACT := from slipcore.contact import Scene, simulate; simulate(Scene.from_toml("table1_condition1"))
 SAMPLES := from slipcore.warm_up import warm_up_samples; warm_up_samples()
 # The detectors' kernels take most of it, a minute of a core: all others are left to the second process.
@@ -79,7 +80,7 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	$(INSTALL) --no-deps --no-build-isolation --editable ./clients --editable .
 	@echo "   installing the packages and, meanwhile, compiling the kernels"
 	@$(COMPILE_DETECTORS) & compiling=$$!; \
-	    { $(INSTALL) --compile-bytecode --require-hashes --requirement constraints.txt && $(BYTECODE) && $(COMPILE_OTHERS); } \
+	    { $(INSTALL) --require-hashes --requirement constraints.txt && $(BYTECODE) && $(COMPILE_OTHERS); } \
 	        || { kill $$compiling; exit 1; }; \
 	    wait $$compiling
 	@touch $@
