@@ -339,6 +339,11 @@ class LinearFriction:
         return extrapolation(self, tangential_velocity, normal_force)
 
     @property
+    def subject(self) -> str:
+        """What its friction is of, as messages say it."""
+        return "the surface"
+
+    @property
     def stale(self) -> str | None:
         """Why this is not its material's model any more; None while it is, and where nobody can know."""
         return None
@@ -428,10 +433,11 @@ class LinearFriction:
         return float(value)  # type: ignore[arg-type]
 
 
-def check_model(model: object) -> None:
-    """Raises ``InvalidArgument`` for what is no fitted model."""
+def check_model(model: object, name: str = "model") -> None:
+    """Raises ``InvalidArgument`` for what is no fitted model, by its ``name``."""
     if not isinstance(model, LinearFriction):
-        raise InvalidArgument("model", shown(model), "a FrictionModel, as FrictionClient.model(name) gives it")
+        allowed = "a FrictionModel, as FrictionClient.model(name) gives it, FrictionModel.load, or estimators.fit"
+        raise InvalidArgument(name, shown(model), allowed)
 
 
 def _near(name: str, known: Iterable[str]) -> str:

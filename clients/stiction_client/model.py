@@ -152,6 +152,11 @@ class FrictionModel(LinearFriction):
             raise InvalidArgument("file", path, f"a whole model (it lacks or garbles {error})") from error
 
     @property
+    def subject(self) -> str:
+        """The material's name, quoted."""
+        return repr(self.material)
+
+    @property
     def chosen_because(self) -> str | None:
         """Why this model answers who names no method, in a sentence; None where it is not known."""
         told = self.diagnostics.get(CHOSEN_BECAUSE)

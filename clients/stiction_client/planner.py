@@ -16,8 +16,7 @@ from stiction_client.defaults import MOST_SLIP
 from stiction_client.elementwise import FloatArray, Number, anywhere, hypot, least, of_these, select
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact
-from stiction_client.linear_friction import KINDS, check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import KINDS, LinearFriction, check_model
 from stiction_client.quantile import FrictionQuantile
 from stiction_client.support import DISAGREEMENT, Kind, kinds, slowest_shown
 
@@ -91,7 +90,7 @@ class RequiredForces:
 
 @overload
 def required_normal_force(
-    model: FrictionModel,
+    model: LinearFriction,
     tangential_load: float,
     slip_probability: float = ...,
     *,
@@ -108,7 +107,7 @@ def required_normal_force(
 
 @overload
 def required_normal_force(
-    model: FrictionModel,
+    model: LinearFriction,
     tangential_load: FloatArray,
     slip_probability: Number = ...,
     *,
@@ -124,7 +123,7 @@ def required_normal_force(
 
 
 def required_normal_force(
-    model: FrictionModel,
+    model: LinearFriction,
     tangential_load: Number,
     slip_probability: Number = SLIP_PROBABILITY,
     *,
@@ -205,7 +204,7 @@ class _Question:
     force of its elements, N, and no x below ``above`` holds.
     """
 
-    model: FrictionModel
+    model: LinearFriction
     count: int
     velocity: Number
     probability: Number
@@ -226,7 +225,7 @@ class _Question:
         return replace(self, limit=limit, loaded=self.loaded.only(where), mean_unit=mean_unit)
 
 
-def _kind(model: FrictionModel, of: str | None) -> str:
+def _kind(model: LinearFriction, of: str | None) -> str:
     """Whose friction is meant."""
     if of is None:
         return "element" if model.scales is None else "contact"

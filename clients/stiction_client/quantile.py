@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction_client.elementwise import Number, hypot, of_these, select, student_quantile
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction
 from stiction_client.support import beyond_velocity, extrapolation_scale
 
 
@@ -20,7 +20,7 @@ from stiction_client.support import beyond_velocity, extrapolation_scale
 class FrictionQuantile:
     """q(f) = a + c·f − √(s² + (k + g·f)² + h(f)²), with f the normal force of an element, N.
 
-    It is the quantile of ``FrictionModel.predict`` at one velocity and probability. With Σ = L·Lᵀ, u = Lᵀ(1, v, 0),
+    It is the quantile of ``LinearFriction.predict`` at one velocity and probability. With Σ = L·Lᵀ, u = Lᵀ(1, v, 0),
     r = Lᵀ(0, 0, 1) and Student's quantiles t of scatter and coefficients, the spread is
     √(t₁²σ² + t₂²|u + f·r|²), and |u + f·r|² = (u·r̂ + |r| f)² + |u − (u·r̂)r̂|²: a sum of squares, which can't turn
     negative by rounding as xᵀΣx can. Scatter between grasps, t₃²τ²(a + c·f)², adds one more square that is linear in
@@ -41,7 +41,7 @@ class FrictionQuantile:
 
     @classmethod
     def of(
-        cls, model: FrictionModel, tangential_velocity: Number, probability: Number, elements: Number = 1.0
+        cls, model: LinearFriction, tangential_velocity: Number, probability: Number, elements: Number = 1.0
     ) -> "FrictionQuantile":
         """The quantile at ``tangential_velocity`` m/s of what so many ``elements`` of a new grasp show on average.
 
@@ -51,7 +51,7 @@ class FrictionQuantile:
 
     @classmethod
     def over(
-        cls, model: FrictionModel, tangential_velocity: Number, probability: Number
+        cls, model: LinearFriction, tangential_velocity: Number, probability: Number
     ) -> Callable[[Number], "FrictionQuantile"]:
         """``of`` as a function of the number of elements alone, on which little of it depends."""
         shared, own = model.scatter(probability)

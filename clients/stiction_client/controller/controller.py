@@ -13,7 +13,7 @@ from stiction_client.controller.records import Command, Mode, Observation, SlipS
 from stiction_client.controller.relaxation import Relaxation
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import StickRatioEstimate
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +59,8 @@ class _Demand(NamedTuple):
 
 def init(
     settings: ControlSettings,
-    model: FrictionModel | None = None,
-    materials: Mapping[str, FrictionModel] | None = None,
+    model: LinearFriction | None = None,
+    materials: Mapping[str, LinearFriction] | None = None,
 ) -> ControllerState:
     """A controller that has seen nothing; ``model``: of the object's material, where that is known.
 
@@ -69,7 +69,7 @@ def init(
     """
     of_kind("settings", settings, ControlSettings)
     if model is not None:
-        of_kind("model", model, FrictionModel)
+        check_model(model)
         return ControllerState(
             settings, KnownFriction.of_model(model, settings), "hold", _floor(settings, rested=False)
         )

@@ -9,7 +9,7 @@ from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.defaults import LEAST_CERTAIN, NORMAL_DEVIATIONS
 from stiction_client.holding import LoadedContact
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction
 from stiction_client.quantile import FrictionQuantile
 
 
@@ -34,7 +34,7 @@ class KnownFriction:
     learnt: bool = False
 
     @classmethod
-    def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
+    def of_model(cls, model: LinearFriction, settings: ControlSettings) -> "KnownFriction":
         """What the planner's answers are computed from (``required_normal_force``).
 
         Where the model has scales, of the contact: scatter within it averages over as many elements as touch

@@ -13,7 +13,7 @@ from stiction_client.controller.settings import ControlSettings
 from stiction_client.defaults import UNKNOWN_FRICTION, UNKNOWN_LEVEL, UNKNOWN_SHARE
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 from stiction_client.quantile import FrictionQuantile
 
 UNKNOWN = "unknown"
@@ -40,13 +40,13 @@ class GripRecognition:
     frames: int = 0
 
     @classmethod
-    def among(cls, models: Mapping[str, FrictionModel], settings: ControlSettings) -> "GripRecognition | None":
+    def among(cls, models: Mapping[str, LinearFriction], settings: ControlSettings) -> "GripRecognition | None":
         """Of these materials; None of none. Raises ``InvalidArgument`` for one that is called "unknown", and for what
         is no model.
         """
         of_kind("materials", models, Mapping)
         for name, model in models.items():
-            of_kind(f"materials[{name!r}]", model, FrictionModel)
+            check_model(model, f"materials[{name!r}]")
         if UNKNOWN in models:
             raise InvalidArgument("materials", sorted(models), f'names other than "{UNKNOWN}"')
         if not models:

@@ -9,8 +9,7 @@ from stiction_client.arguments import number, shown, whole
 from stiction_client.contacts import AREAS
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import FORCES, VELOCITIES, check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import FORCES, VELOCITIES, LinearFriction, check_model
 
 QUANTILE = 0.05
 """Default: nineteen observations of twenty have more friction."""
@@ -33,7 +32,7 @@ class Terms(TypedDict, total=False):
 
 
 def conservative_friction(
-    model: FrictionModel,
+    model: LinearFriction,
     normal_force: float,
     quantile: float = QUANTILE,
     *,
@@ -59,7 +58,7 @@ def conservative_friction(
     support = model.support_at(v, f_n)
     if not allow_unidentified and support.kind in ("not identified", "implausible"):
         allowed = "supported, or allow_unidentified=True"
-        raise InvalidArgument(f"friction of {model.material!r}", f"{support.kind} ({support.advice})", allowed)
+        raise InvalidArgument(f"friction of {model.subject}", f"{support.kind} ({support.advice})", allowed)
     friction = float(model.predict(v, f_n, quantile, of="contact", elements=elements))
     if not 0.0 < friction < math.inf:
         where = f"quantile {quantile:g}, {f_n:g} N an element and {v:g} m/s"
@@ -68,7 +67,7 @@ def conservative_friction(
 
 
 def friction_cone(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, edges: int = 8, **terms: Unpack[Terms]
+    model: LinearFriction, normal_force: float, quantile: float = QUANTILE, *, edges: int = 8, **terms: Unpack[Terms]
 ) -> FloatArray:
     """Edges of a linearised friction cone, [edges, 3]: (f_x, f_y, f_z) with f_z = 1 along the contact normal.
 
@@ -82,7 +81,7 @@ def friction_cone(
 
 
 def cone_half_angle(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
+    model: LinearFriction, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
 ) -> float:
     """Angle between the contact normal and the edge of the friction cone, rad; ``normal_force`` N an element."""
     return math.atan(conservative_friction(model, normal_force, quantile, **terms))

@@ -7,8 +7,7 @@ from typing import Unpack
 from stiction_client.arguments import number
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
-from stiction_client.linear_friction import check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class CoulombFriction:
 
 
 def drake_friction(
-    model: FrictionModel,
+    model: LinearFriction,
     normal_force: float,
     quantile: float = QUANTILE,
     *,

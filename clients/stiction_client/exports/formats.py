@@ -7,8 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 from stiction_client.arguments import of_kind
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
-from stiction_client.linear_friction import check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 from stiction_client.planner import RequiredForce
 
 ONE_DEVIATION = 0.15865525393145707
@@ -37,7 +36,7 @@ class PhysxMaterial:
 
 
 def physx_material(
-    model: FrictionModel,
+    model: LinearFriction,
     normal_force: float,
     quantile: float = QUANTILE,
     *,
@@ -55,14 +54,14 @@ def physx_material(
     return PhysxMaterial(static, min(static, moving))
 
 
-def sdf_surface(model: FrictionModel, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]) -> str:
+def sdf_surface(model: LinearFriction, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]) -> str:
     """The ``<surface>`` of an SDFormat collision, as Gazebo takes it; of two surfaces it takes the smaller friction."""
     friction = conservative_friction(model, normal_force, quantile, **terms)
     return f"<surface><friction><ode><mu>{friction:.9g}</mu><mu2>{friction:.9g}</mu2></ode></friction></surface>"
 
 
 def urdf_gazebo(
-    model: FrictionModel, link: str, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
+    model: LinearFriction, link: str, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
 ) -> str:
     """Gazebo's extension of a URDF ``link``; URDF itself has no friction of contacts."""
     of_kind("link", link, str)
@@ -70,7 +69,7 @@ def urdf_gazebo(
     return f"<gazebo reference={quoteattr(link)}><mu1>{friction:.9g}</mu1><mu2>{friction:.9g}</mu2></gazebo>"
 
 
-def dexnet_friction(model: FrictionModel, normal_force: float, **terms: Unpack[Terms]) -> dict[str, float]:
+def dexnet_friction(model: LinearFriction, normal_force: float, **terms: Unpack[Terms]) -> dict[str, float]:
     """Dex-Net's two parameters: the expected friction, and its *variance*, as which ``sigma_friction_coef`` is used.
 
     Its grasps are scored over random friction, so that the spread is the caution here: that of a new observation, from

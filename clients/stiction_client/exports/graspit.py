@@ -6,8 +6,7 @@ from typing import Unpack
 from stiction_client.arguments import of_kind
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
-from stiction_client.linear_friction import check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 
 GRASPIT_MATERIALS = ("frictionless", "glass", "metal", "plastic", "wood", "rubber", "stone")
 """The materials of GraspIt!, by their number. It reads no names of others, so that a pair must be of these."""
@@ -39,7 +38,7 @@ class GraspitFriction:
 
 
 def graspit_friction(
-    model: FrictionModel,
+    model: LinearFriction,
     materials: tuple[str, str],
     normal_force: float,
     quantile: float = QUANTILE,

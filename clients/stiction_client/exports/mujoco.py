@@ -8,8 +8,7 @@ from stiction_client.arguments import number, of_kind, shown, whole
 from stiction_client.contacts import HERTZ_TORSION, Contact
 from stiction_client.errors import InvalidArgument
 from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
-from stiction_client.linear_friction import check_model
-from stiction_client.model import FrictionModel
+from stiction_client.linear_friction import LinearFriction, check_model
 from stiction_client.quantile import FrictionQuantile
 
 IMPRATIO, NOSLIP_ITERATIONS = 10, 3
@@ -46,7 +45,7 @@ class MujocoPair:
 
 
 def mujoco_pair(
-    model: FrictionModel,
+    model: LinearFriction,
     geoms: tuple[str, str],
     grip_force: float,
     contact: Contact,
@@ -97,7 +96,7 @@ def _names(geoms: tuple[str, str]) -> tuple[str, str]:
 
 
 def mujoco_friction(
-    model: FrictionModel,
+    model: LinearFriction,
     normal_force: float,
     quantile: float = QUANTILE,
     *,
@@ -115,7 +114,7 @@ def mujoco_friction(
 
 
 def mujoco_geom(
-    model: FrictionModel,
+    model: LinearFriction,
     normal_force: float,
     quantile: float = QUANTILE,
     *,
