@@ -1,9 +1,10 @@
 """The fitted friction model as the planner's side sees it; evaluated here, without the network."""
 
 import json
+import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_client import json_values
+from stiction_client.arguments import of_kind
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
     LinearFriction,
     Scales,
+    check_model,
     degrees_to_json,
 )
 from stiction_client.support import CHOSEN_BECAUSE, OUTDATED, SUPERSEDED, Domain
@@ -60,6 +63,21 @@ class FrictionModel(LinearFriction):
     created_at: str = ""
     scales: Scales | None = None
     outdated: bool = False
+
+    @classmethod
+    def of(cls, fitted: LinearFriction, material: str, version: int = 1) -> "FrictionModel":
+        """What ``estimators.fit`` gave, as a model of a ``material``, which can be saved and has its name.
+
+        Diagnostics that are no finite numbers, which JSON does not have, are None.
+        """
+        check_model(fitted, "fitted")
+        of_kind("material", material, str)
+        shared = {each.name: getattr(fitted, each.name) for each in fields(cls) if hasattr(fitted, each.name)}
+        finite = {
+            name: None if isinstance(value, float) and not math.isfinite(value) else value
+            for name, value in fitted.diagnostics.items()
+        }
+        return cls(**shared | {"diagnostics": finite, "material": material, "version": version})
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":

@@ -1,7 +1,9 @@
 """A model that was fitted here, without a service, is taken wherever one of a service is."""
 
+import math
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,9 +49,25 @@ def fitted() -> estimators.FrictionModel:
 def test_a_fitted_model_is_answered_as_the_same_one_of_a_service(
     fitted: estimators.FrictionModel, question: str
 ) -> None:
-    known = {each.name: getattr(fitted, each.name) for each in fields(fitted) if each.name != "draws"}
     ask = QUESTIONS[question]
-    assert ask(fitted) == ask(FrictionModel(material="felt", version=1, **known))
+    assert ask(fitted) == ask(FrictionModel.of(fitted, "felt"))
+
+
+def test_a_fitted_model_can_be_saved_by_a_name(fitted: estimators.FrictionModel, tmp_path: Path) -> None:
+    odd = replace(fitted, diagnostics={**fitted.diagnostics, "condition_number": math.inf})
+    FrictionModel.of(odd, "felt").save(tmp_path / "felt.json")
+    again = FrictionModel.load(tmp_path / "felt.json")
+    assert (again.material, again.version, again.diagnostics["condition_number"]) == ("felt", 1, None)
+    assert QUESTIONS["a plan"](again) == QUESTIONS["a plan"](fitted)
+
+
+@pytest.mark.parametrize(("wrong", "material", "name"), [("paper", "felt", "fitted"), (None, 3, "material")])
+def test_what_is_no_fit_or_no_name_is_refused(
+    fitted: estimators.FrictionModel, wrong: Any, material: Any, name: str
+) -> None:
+    with pytest.raises(InvalidArgument) as refusal:
+        FrictionModel.of(wrong or fitted, material)
+    assert refusal.value.name == name
 
 
 def test_a_fitted_model_that_shows_nothing_is_refused_by_name() -> None:

@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -220,11 +220,8 @@ def to_client_model(stored: StoredModel) -> "stiction_client.FrictionModel":
     What the diagnostics could not say in JSON stays None.
     """
     model = to_friction_model(stored.model)
-    fitted = {each.name: getattr(model, each.name) for each in fields(model) if each.name != "draws"}
-    return stiction_client.FrictionModel(
-        **fitted | {"diagnostics": stored.model.diagnostics},
-        material=stored.material,
-        version=stored.version,
+    return replace(
+        stiction_client.FrictionModel.of(model, stored.material, stored.version),
         current=stored.current,
         outdated=stored.outdated,
         created_at=stored.created_at.isoformat(),
