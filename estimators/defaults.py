@@ -88,6 +88,8 @@ class Prior(Options):
         float, Option(1e-4, 10.0, "-", "gouge and a bench at 1 µm/s to 0.2 mm/s: 0.1 to 6 %, root mean square 4.4")
     ] = 0.05
     """The least of it from rest to the speed of slip, however slow, where no sample shows β₁."""
+    contradicted: Annotated[float, Option(1.0, 100.0, "standard deviations", "one in 370 lies beyond")] = 3.0
+    """Of both together, beyond which a slope that samples show contradicts that."""
     unknown_velocity: Annotated[float, Option(1e-6, 1.0, "m/s", "incipient slip: 0.1 to 10 mm/s")] = 1e-3
     """Root mean square of those unknown: then 2 % of friction; of rocks it is 1 to 3 % a decade (Marone, 1998)."""
     velocity_tilt: Annotated[float, Option(0.0, 10.0, "-", "a third slower or faster at half the force")] = 0.5

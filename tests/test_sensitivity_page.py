@@ -44,7 +44,7 @@ ENTRIES = {
     "slipcore.forces.PRIOR": ("unseen_shear", "of depth alone, which no press on the page has"),
     "slipcore.forces.SUPPORT": ("least_probability", "changes no force, only deviations"),
     "estimators.PRIOR": (
-        "least_velocity_effect",
+        "contradicted least_velocity_effect",
         "of slip at one speed, which no log on the page has; docs/estimators.md has what it is from",
     ),
     "filter": (

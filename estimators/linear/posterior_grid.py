@@ -85,7 +85,8 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
     grasps = with_slopes_that_differ(data.grasp_statistics(), pooled.mean)
     spans = weak_spans(data.domain, data.element_area)
     grid = _closed_in(hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior), data)
-    slope = assumed_slope(data, float(grid.nodes.moments()[1][1, 1]))
+    mean, covariance = grid.nodes.moments()
+    slope = assumed_slope(data, float(mean[1]), covariance)
     if slope is None:
         return grid
     return replace(_closed_in(grid.model.with_slope(slope.precision), data), slope=slope)

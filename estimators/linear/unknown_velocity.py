@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import IDENTIFIABILITY, PRIOR, REFERENCE
+from estimators.defaults import IDENTIFIABILITY, PRIOR, REFERENCE, ROUNDING
 from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
@@ -36,24 +36,38 @@ class AssumedSlope:
     change: float
 
 
-def assumed_slope(data: FitData, variance: float) -> AssumedSlope | None:
-    """What is assumed of β₁ where data by themselves know it with this ``variance``, (s/m)²; None where they know it.
+def assumed_slope(data: FitData, slope: float, covariance: FloatArray) -> AssumedSlope | None:
+    """What is assumed of β₁, s/m, where data by themselves know it as ``slope`` and β by this ``covariance`` [3, 3];
+    None where they know it, or where they contradict what would be assumed.
 
-    They do where friction at rest follows to within a tenth, or to 1/√2 of what would be assumed: a prior would then
-    only bias what they say. Where they know less, the two together are taken to know no more than that. Samples of
-    unknown velocity show friction near to rest themselves.
+    They know it where from friction at the speed of slip that at rest follows to within a tenth, or to 1/√2 of what
+    would be assumed: a prior would then only bias what they say. Where they know less, the two together are taken to
+    know no more than that. Samples of unknown velocity show friction near to rest themselves.
     """
     speed, spread = data.speed()
-    friction, change = abs(data.mean_friction), change_from_rest(speed)
+    friction, variance = _beside_friction(data, covariance)
     if data.unknown_velocity > 0.0 or not (speed > 0.0 and friction > 0.0):
         return None
-    of_data = variance * (speed / friction) ** 2
+    change, of_data = change_from_rest(speed), variance * (speed / friction) ** 2
     enough = min(IDENTIFIABILITY.effect / special.ndtri(IDENTIFIABILITY.ends[1]), change / math.sqrt(2.0)) ** 2
-    if of_data <= enough:
+    contradicted = (slope * speed / friction) ** 2 > PRIOR.contradicted**2 * (of_data + change**2)
+    if of_data <= enough or contradicted:
         return None
     weight = min(change**2 * (1.0 / enough - 1.0 / of_data), 1.0)
     slowest = max(data.domain.tangential_velocity[0], speed - 2.0 * spread)
     return AssumedSlope(weight * (speed / (change * friction)) ** 2, speed, slowest, change)
+
+
+def _beside_friction(data: FitData, covariance: FloatArray) -> tuple[float, float]:
+    """Root mean square of friction in the middle of the data, and the variance of β₁ that is left where it is known.
+
+    By what grasps scatter all coefficients are scaled alike, which leaves the change from rest the part that it is.
+    """
+    at, variance = data.mean_row(), float(covariance[1, 1])
+    along, level = float(covariance[1] @ at), float(at @ covariance @ at)
+    if not level > ROUNDING * float(at @ np.abs(covariance) @ at):  # what is left of variances that cancel
+        return abs(data.mean_friction), variance
+    return math.hypot(data.mean_friction, math.sqrt(level)), max(variance - along**2 / level, 0.0)
 
 
 def change_from_rest(speed: float) -> float:

@@ -66,7 +66,7 @@ def test_the_posterior_is_that_of_friction_where_it_slid_and_of_a_change_from_th
         still = [replace(each, tangential_velocity=np.zeros(300)) for each in grasps(5e-3, count)]
         level, own = posterior_grid(gather(still)).nodes.moments()
         rest, sliding = np.array([1.0, 0.0, MIDDLE]), np.array([1.0, 5e-3, MIDDLE])
-        change = PRIOR.velocity_effect * gather(grasps(5e-3, count)).mean_friction
+        change = PRIOR.velocity_effect * np.hypot(gather(grasps(5e-3, count)).mean_friction, np.sqrt(rest @ own @ rest))
         assert sliding @ mean == pytest.approx(rest @ level, rel=1e-4)
         assert sliding @ covariance @ sliding == pytest.approx(rest @ own @ rest, rel=1e-3)
         assert covariance[1, 1] == pytest.approx((change / 5e-3) ** 2, rel=1e-3)

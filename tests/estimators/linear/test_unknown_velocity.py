@@ -30,6 +30,10 @@ def test_friction_is_off_alike_and_tilted_about_the_mean_force() -> None:
     assert columns_off(0.0)[1].tolist() == [0.0, 0.0, 0.0]
 
 
+OF_SLOPE = np.diag([0.0, 1.0, 0.0])
+"""A covariance of β₁ alone."""
+
+
 def data(speed: float) -> FitData:
     """Of friction 0.5."""
     one = np.ones(50)
@@ -57,17 +61,36 @@ def test_what_is_assumed_of_a_slope_gives_way_to_what_data_say_of_it() -> None:
         (1e-3, 0.05, 0.05 / 2**0.5),
     ):
         told, unit = data(speed), (0.5 / speed) ** 2
+        rest = np.outer([-speed, 1.0, 0.0], [-speed, 1.0, 0.0])  # of β, by which friction at this speed stays
         for known in (1e3, 3.0 * change, 1.1 * change, 1.01 * enough):
-            slope = assumed_slope(told, known**2 * unit)
+            slope = assumed_slope(told, 0.0, known**2 * unit * rest)
             assert slope is not None
             both = 1.0 / np.sqrt(slope.precision * unit + known**-2)
             assert both == pytest.approx(max(enough, 1.0 / np.hypot(1.0 / known, 1.0 / change)), rel=1e-4)
             assert (slope.speed, slope.slowest, slope.change) == (speed, speed, pytest.approx(change))
         for known in (0.99 * enough, 1e-6 * enough, 0.0):
-            assert assumed_slope(told, known**2 * unit) is None
+            assert assumed_slope(told, 0.0, known**2 * unit * rest) is None
 
 
 def test_nothing_is_assumed_of_slip_at_rest_nor_without_friction() -> None:
-    assert assumed_slope(data(0.0), 1e9) is None
+    assert assumed_slope(data(0.0), 0.0, 1e9 * OF_SLOPE) is None
     smooth = replace(data(5e-3), factor=replace(data(5e-3).factor, mean=np.array([5e-3, 0.1, 0.0])))
-    assert assumed_slope(smooth, 1e9) is None
+    assert assumed_slope(smooth, 0.0, 0.0 * OF_SLOPE) is None
+
+
+def test_a_slope_that_the_samples_show_is_not_pulled_to_nothing() -> None:
+    """Beyond three deviations of both they contradict what would be assumed; of 0.5 by a tenth and by as much."""
+    told, speed, deviation = data(5e-3), 5e-3, 0.05 / 5e-3
+    rest = deviation**2 * np.outer([-speed, 1.0, 0.0], [-speed, 1.0, 0.0])
+    for many, assumed in ((2.9, True), (-2.9, True), (3.1, False), (-3.1, False)):
+        slope = many * np.hypot(deviation, deviation)
+        found = assumed_slope(told, slope, rest)
+        assert (found is not None) is assumed
+
+
+def test_what_scales_the_whole_law_is_no_doubt_of_how_it_changes() -> None:
+    """Of one grasp, whose factor nobody knows, friction at rest is known as a part of that where it slid."""
+    law, told = np.array([0.2, 60.0, 0.0]), data(5e-3)
+    scaled = 0.2**2 * np.outer(law, law)
+    assert assumed_slope(told, 60.0, scaled) is None
+    assert assumed_slope(told, 60.0, scaled + 20.0**2 * np.outer([-5e-3, 1.0, 0.0], [-5e-3, 1.0, 0.0])) is not None
