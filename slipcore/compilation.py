@@ -149,7 +149,10 @@ class _Compiler(Compiler):  # type: ignore[misc]
     """
 
     def _compile_bytecode(self) -> Any:
-        numbas, arrayobj.raise_with_shape_context = arrayobj.raise_with_shape_context, _refuse_shapes
+        numbas = getattr(arrayobj, "raise_with_shape_context", None)
+        if numbas is None:  # a numba that says it in another way compiles as it does
+            return super()._compile_bytecode()
+        arrayobj.raise_with_shape_context = _refuse_shapes
         try:
             return super()._compile_bytecode()
         finally:

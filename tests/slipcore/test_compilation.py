@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numba import config, njit
 from numba.core.caching import NullCache
+from numba.np import arrayobj
 
 from slipcore import compilation
 from slipcore.compilation import address_of, borrowed, call_at, compiled
@@ -171,6 +172,13 @@ def test_arrays_of_unequal_shapes_are_still_refused_and_numbas_own_kernels_say_w
         fill_first(rows, np.ones(2))
     with pytest.raises(ValueError, match=r"shape \(3,\) from input of shape \(2,\)"):
         fill_first_of_numba(rows, np.ones(2))
+
+
+@pytest.mark.usefixtures("package")
+def test_a_numba_that_says_unequal_shapes_in_another_way_compiles_as_it_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(arrayobj, "raise_with_shape_context")
+    assert run() == (2.0, 1)
+    assert not hasattr(arrayobj, "raise_with_shape_context")
 
 
 @compiled
