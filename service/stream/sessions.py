@@ -112,6 +112,7 @@ class Streams:
         self._starting = asyncio.Lock()
         self._sessions: dict[str, Session] = {}
         self._dropping: set[asyncio.Task[None]] = set()
+        self._prepared: set[tuple[str, ...]] = set()
         self._preparing: dict[tuple[str, ...], asyncio.Task[None]] = {}
         self._watchers = Watchers()
         self._turns = UnboundedFairQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
@@ -151,6 +152,8 @@ class Streams:
 
     async def _prepare(self, methods: tuple[str, ...]) -> None:
         """See that the process has the kernels of these methods; raises ``End`` where they are not there in time."""
+        if methods in self._prepared:
+            return
         preparing = self._preparing.get(methods)
         if preparing is None:
             preparing = asyncio.create_task(self.call(detectors.prepare, *methods, is_long=True))
@@ -159,11 +162,9 @@ class Streams:
         await asyncio.wait({preparing}, timeout=PREPARE_SECONDS)
         if not preparing.done():
             raise End(NOT_READY, "the detector is being compiled, minutes after an installation; open again in 30 s")
-        try:
-            preparing.result()
-        except BaseException:
-            self._preparing.pop(methods, None)
-            raise
+        self._preparing.pop(methods, None)
+        preparing.result()
+        self._prepared.add(methods)
 
     def _check_room(self, owner: str) -> None:
         if len(self._sessions) >= MOST_SESSIONS:
@@ -289,6 +290,7 @@ class Streams:
         for session in self._sessions.values():
             session.broadcast.end(pack_end("The detector's process ended.", None))
         self._sessions.clear()
+        self._prepared.clear()
         self._preparing.clear()
 
     async def _started(self) -> SideProcess:
