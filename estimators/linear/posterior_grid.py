@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from estimators.defaults import GRID
+from estimators.linear.assumed_slope import AssumedSlope, assumed_slope
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierarchical
 from estimators.linear.log_sum import log_sum
@@ -16,7 +17,7 @@ from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior, structured, weak_spans
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.slopes_of_grasps import with_slopes_that_differ
-from estimators.linear.unknown_velocity import AssumedSlope, assumed_slope, offset_variance
+from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,7 +48,7 @@ class ScaleNodes(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class PosteriorGrid:
     """Nodes over ``axes``, log λ [l], log ρ [r] and, of several sensors, log ν [q]; with the sums at the first two, and
-    ``log_marginal`` [l, r (, q)]. ``slope``: what of β₁ is assumed, where the data do not show it.
+    ``log_marginal`` [l, r (, q)]. ``slope``: the prior of β₁ that is assumed where the data do not show it.
     """
 
     model: Hierarchical
@@ -76,10 +77,9 @@ class PosteriorGrid:
 
 
 def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> PosteriorGrid:
-    """Posterior of the hierarchical model for these data, on a grid that closes in on where its mass lies.
+    """Posterior of the hierarchical model for these data; where they leave β₁ open, by a prior of it that is assumed.
 
-    b̂, along which a grasp scales the law, is the posterior mean of the grid before, of which also follows by how much
-    unknown velocities put friction off. Where the data leave β₁ open, a second time with what is assumed of it.
+    Whether they do is seen from the posterior without that prior, so that the grid is then made twice.
     """
     pooled = exact_posterior(data)
     grasps = with_slopes_that_differ(data.grasp_statistics(), pooled.mean)
@@ -93,7 +93,11 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
 
 
 def _closed_in(model: Hierarchical, data: FitData) -> PosteriorGrid:
-    """The posterior on a grid that closes in: b̂ and what unknown velocities are off by follow from each grid before."""
+    """The posterior on a grid that closes in, round by round, on where its mass lies.
+
+    Each grid gives the next one b̂, along which a grasp scales the law (its posterior mean), and by how much unknown
+    velocities put friction off.
+    """
     box = _widest(model)
     fine = GRID.fine if len(box) == 2 else GRID.beside_gains
     for turn in range(GRID.rounds):

@@ -11,6 +11,7 @@ from scipy import special
 from estimators.defaults import IDENTIFIABILITY, REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
 from estimators.likelihoods.posterior import PosteriorSummary
+from estimators.linear.assumed_slope import AssumedSlope
 from estimators.linear.fit_data import FitData, GraspData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.mixture_summary import scatter_alone
@@ -19,7 +20,6 @@ from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.linear.statistics import SufficientStatistics
-from estimators.linear.unknown_velocity import AssumedSlope
 from estimators.methods.identifiability import effects, identifiable, takes_as_independent, what_to_record
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 from stiction_client.support import (

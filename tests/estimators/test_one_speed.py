@@ -9,10 +9,10 @@ from scipy import special
 
 from estimators import FrictionModel, Moments, fit
 from estimators.defaults import PRIOR
-from estimators.linear import unknown_velocity
+from estimators.linear import assumed_slope
+from estimators.linear.assumed_slope import change_from_rest
 from estimators.linear.fit_data import gather
 from estimators.linear.posterior_grid import posterior_grid
-from estimators.linear.unknown_velocity import change_from_rest
 from slipcore.samples import FrictionSamples
 from stiction_client.support import ASSUMED_CHANGE, SLOWEST_SLIP
 
@@ -78,7 +78,7 @@ def test_nothing_is_assumed_where_the_samples_show_what_velocity_does(monkeypatc
     before = fit(data, method="hierarchical")
     assert before.identifiable[1]
     assert not {SLOWEST_SLIP, ASSUMED_CHANGE} & {*before.diagnostics}
-    monkeypatch.setattr(unknown_velocity, "change_from_rest", lambda _: 10.0)
+    monkeypatch.setattr(assumed_slope, "change_from_rest", lambda _: 10.0)
     after = fit(data, method="hierarchical")
     np.testing.assert_array_equal(after.coefficients, before.coefficients)
     np.testing.assert_array_equal(after.covariance, before.covariance)
