@@ -1,6 +1,7 @@
-"""What callers may pass beside samples: refused by name, as samples are."""
+"""Checks of what callers pass beside samples: like samples, it is refused by ``InvalidSamples``."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Collection
 from numbers import Integral
 from types import UnionType
 
@@ -9,8 +10,23 @@ from slipcore.arguments import number, of_kind, shown
 from slipcore.errors import InvalidInput
 
 
+def above_zero(value: float) -> bool:
+    """Above 0 and finite."""
+    return 0.0 < value < math.inf
+
+
+def at_least_zero(value: float) -> bool:
+    """0 or above, and finite."""
+    return 0.0 <= value < math.inf
+
+
+def between_zero_and_one(value: float) -> bool:
+    """Above 0 and below 1."""
+    return 0.0 < value < 1.0
+
+
 def check_number(name: str, value: object, inside: Callable[[float], bool], allowed: str) -> None:
-    """Raises ``InvalidSamples`` for what is no number, or not ``inside`` what is ``allowed``."""
+    """Raises ``InvalidSamples`` for a value that is no number, or not ``inside`` its range; ``allowed`` tells which."""
     try:
         is_allowed = inside(number(name, value, allowed))
     except InvalidInput as error:
@@ -20,9 +36,15 @@ def check_number(name: str, value: object, inside: Callable[[float], bool], allo
 
 
 def check_whole(name: str, value: object, least: int) -> None:
-    """Raises ``InvalidSamples`` for what is no whole number of ``least`` or more."""
+    """Raises ``InvalidSamples`` for a value that is no whole number of ``least`` or more."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
         raise InvalidSamples(name, shown(value), f"a whole number, at least {least}")
+
+
+def check_choice(name: str, value: object, choices: Collection[str]) -> None:
+    """Raises ``InvalidSamples`` for a value that is none of the ``choices``."""
+    if not isinstance(value, str) or value not in choices:
+        raise InvalidSamples(name, value, ", ".join(choices))
 
 
 def check_kind(name: str, value: object, kind: type | UnionType) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.arguments import check_kind, check_number, check_whole
+from estimators.arguments import above_zero, at_least_zero, between_zero_and_one, check_kind, check_number, check_whole
 from estimators.defaults import ALARM, CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -55,8 +55,8 @@ class ChangeAlarm:
         scatter_prior: ScatterPrior = WEAK,
     ) -> "ChangeAlarm":
         """An alarm that has seen no grasp; raises ``InvalidSamples`` for settings that cannot be."""
-        check_number("rate", rate, lambda value: 0.0 < value < 1.0, "above 0 and below 1")
-        check_number("shift", shift, lambda value: 0.0 < value < math.inf, "above 0")
+        check_number("rate", rate, between_zero_and_one, "above 0 and below 1")
+        check_number("shift", shift, above_zero, "above 0")
         check_whole("reference", reference, 1)
         check_kind("scatter_prior", scatter_prior, ScatterPrior)
         return cls(rate, shift, reference, scatter_prior=scatter_prior)
@@ -64,7 +64,7 @@ class ChangeAlarm:
     def step(self, level: float, variance: float) -> "ChangeAlarm":
         """The alarm after one more grasp; see ``grasp_level``."""
         check_number("level", level, math.isfinite, "finite")
-        check_number("variance", variance, lambda value: 0.0 <= value < math.inf, "finite, at least 0")
+        check_number("variance", variance, at_least_zero, "finite, at least 0")
         levels, variances = (*self.levels, level), (*self.variances, variance)
         return replace(self, levels=levels[-ALARM.longest :], variances=variances[-ALARM.longest :])
 

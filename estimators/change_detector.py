@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from estimators.arguments import check_kind, check_number, check_whole
+from estimators.arguments import above_zero, between_zero_and_one, check_kind, check_number, check_whole
 from estimators.defaults import CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -36,8 +36,8 @@ class ChangeDetector:
 
     def __post_init__(self) -> None:
         check_kind("model", self.model, FrictionModel)
-        check_number("alarm", self.alarm, lambda value: 0.0 < value < 1.0, "above 0 and below 1")
-        check_number("spread", self.spread, lambda value: 0.0 < value < math.inf, "above 0")
+        check_number("alarm", self.alarm, between_zero_and_one, "above 0 and below 1")
+        check_number("spread", self.spread, above_zero, "above 0")
         check_whole("reset_after", self.reset_after, 1)
 
     @property
@@ -81,6 +81,6 @@ class ChangeDetector:
         freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
         deviation = (mu - float(x @ model.coefficients)) / max(spread, np.finfo(float).tiny)
         if not np.isfinite(deviation):
-            raise InvalidSamples("sample", (v, f_n, mu), "numbers of a usual size")
+            raise InvalidSamples("sample", (v, f_n, mu), "numbers whose deviation from the model is finite")
         score = special.ndtri(special.stdtr(freedom, -abs(deviation)))
         return float(np.copysign(min(-score, CHANGE.farthest), deviation))

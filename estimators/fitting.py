@@ -3,7 +3,7 @@
 from dataclasses import replace
 from types import NoneType
 
-from estimators.arguments import check_kind, check_number, check_whole
+from estimators.arguments import check_choice, check_kind, check_number, check_whole
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
@@ -27,11 +27,10 @@ def needs_samples(method: str, grasps: int) -> bool:
 
 
 def check_method(method: str) -> None:
-    """Raises ``InvalidSamples`` for a ``method`` that ``fit`` does not have: before samples are found, which takes
-    long.
+    """Raises ``InvalidSamples`` for a ``method`` that ``fit`` does not have; worth a call before slip is looked for,
+    which takes long.
     """
-    if not isinstance(method, str) or method not in METHODS:
-        raise InvalidSamples("method", method, ", ".join(METHODS))
+    check_choice("method", method, METHODS)
 
 
 def fit(
@@ -69,8 +68,7 @@ def fit(
     check_whole("seed", seed, 0)
     check_kind("likelihood", likelihood, str | NoneType)
     check_kind("scatter_prior", scatter_prior, ScatterPrior | NoneType)
-    if not isinstance(loss, str) or loss not in LOSSES:
-        raise InvalidSamples("loss", loss, ", ".join(LOSSES))
+    check_choice("loss", loss, LOSSES)
     if likelihood is not None and method != "bayes":
         raise InvalidSamples("likelihood", likelihood, f'none with method "{method}", only with "bayes"')
     if scatter_prior is not None and (method not in SCATTER_METHODS or likelihood not in {None, "hierarchical"}):

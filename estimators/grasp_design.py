@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.arguments import check_kind, check_number, check_whole
+from estimators.arguments import above_zero, at_least_zero, check_kind, check_number, check_whole
 from estimators.defaults import DESIGN, IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel, Scales
@@ -31,21 +31,18 @@ SPEEDS, LENGTHS = DESIGN.least_speed * 2.0 ** np.arange(4), DESIGN.least_length 
 """Of a probe's slip, m/s and m, that a robot may choose unless another is given."""
 
 
-def _above_zero(value: float) -> bool:
-    return 0.0 < value < math.inf
+def _check_each(name: str, values: object, allowed: str) -> None:
+    """Raises ``InvalidSamples`` unless these are one or more numbers above 0."""
+    if not isinstance(values, Sequence) or not values:
+        raise InvalidSamples(name, shown(values), allowed)
+    for value in values:
+        check_number(name, value, above_zero, allowed)
 
 
-def _not_below_zero(value: float) -> bool:
-    return 0.0 <= value < math.inf
-
-
-def _check_ends(name: str, ends: object, allowed: str) -> None:
-    """Raises ``InvalidSamples`` for what are no two numbers above 0, the least first."""
-    if not isinstance(ends, Sequence) or len(ends) != 2:
-        raise InvalidSamples(name, shown(ends), allowed)
-    for end in ends:
-        check_number(name, end, _above_zero, allowed)
-    if ends[0] > ends[1]:
+def _check_ends(name: str, ends: tuple[float, float], allowed: str) -> None:
+    """Raises ``InvalidSamples`` unless these are two numbers above 0, the smaller one first."""
+    _check_each(name, ends, allowed)
+    if len(ends) != 2 or ends[0] > ends[1]:
         raise InvalidSamples(name, shown(ends), allowed)
 
 
@@ -61,8 +58,8 @@ class WorkingPoint:
     elements: int = DESIGN.elements
 
     def __post_init__(self) -> None:
-        check_number("normal_force", self.normal_force, _above_zero, "N an element, above 0")
-        check_number("tangential_velocity", self.tangential_velocity, _not_below_zero, "m/s, at least 0")
+        check_number("normal_force", self.normal_force, above_zero, "N an element, above 0")
+        check_number("tangential_velocity", self.tangential_velocity, at_least_zero, "m/s, at least 0")
         check_number("quantile", self.quantile, lambda value: 0.0 < value < 0.5, "above 0 and below 0.5")
         check_whole("elements", self.elements, 1)
 
@@ -91,22 +88,18 @@ class Probing:
 
     def __post_init__(self) -> None:
         for name, unit in (("speed", "m/s"), ("length", "m")):
-            values, allowed = getattr(self, name), f"one or more, each above 0 {unit}"
-            if not isinstance(values, Sequence) or not values:
-                raise InvalidSamples(name, shown(values), allowed)
-            for value in values:
-                check_number(name, value, _above_zero, allowed)
+            _check_each(name, getattr(self, name), f"one or more, each above 0 {unit}")
         if self.normal_force is not None:
             _check_ends("normal_force", self.normal_force, "N an element, above 0, the least first")
-        check_number("seconds", self.seconds, _not_below_zero, "s, at least 0")
-        check_number("frame_rate", self.frame_rate, _above_zero, "1/s, above 0")
-        check_number("load", self.load, _not_below_zero, "N, at least 0")
-        half = (lambda value: 0.0 < value <= 0.5), "above 0, at most 0.5"
-        check_number("drop_probability", self.drop_probability, *half)
-        part = (lambda value: 0.0 < value <= 1.0), "a part of the contact, above 0 and at most 1"
-        check_number("slipping", self.slipping, *part)
-        check_number("force_spread", self.force_spread, _not_below_zero, "a part of the mean, at least 0")
-        check_number("velocity_spread", self.velocity_spread, _not_below_zero, "a part of the mean, at least 0")
+        check_number("seconds", self.seconds, at_least_zero, "s, at least 0")
+        check_number("frame_rate", self.frame_rate, above_zero, "1/s, above 0")
+        check_number("load", self.load, at_least_zero, "N, at least 0")
+        allowed = "above 0, at most 0.5"
+        check_number("drop_probability", self.drop_probability, lambda value: 0.0 < value <= 0.5, allowed)
+        allowed = "a part of the contact, above 0 and at most 1"
+        check_number("slipping", self.slipping, lambda value: 0.0 < value <= 1.0, allowed)
+        for name in ("force_spread", "velocity_spread"):
+            check_number(name, getattr(self, name), at_least_zero, "a part of the mean, at least 0")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +129,7 @@ def next_grasp(
     """The grasp that most narrows friction at the working point per second of robot time.
 
     ``grasps`` made so far choose its direction, of which the law knows nothing: directions are spread evenly. Raises
-    ``InvalidSamples`` where no grasp that the robot can make bears its load, and for what are no such things.
+    ``InvalidSamples`` where no grasp that the robot can make bears its load, and for arguments of another kind.
     """
     probing = Probing() if probing is None else probing
     check_kind("model", model, FrictionModel)

@@ -36,7 +36,7 @@ def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
     """The prior of scatter between grasps of a new material, by the ``models`` of others like it, one a material.
 
     Those count that have ``scales`` and were fitted to four grasps or more; without any it is the default. Their
-    order does not matter. Raises ``InvalidSamples`` for what are no models.
+    order does not matter. Raises ``InvalidSamples`` for anything else than models.
     """
     weak = ScatterPrior()
     try:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.arguments import check_kind, check_number
+from estimators.arguments import above_zero, check_kind, check_number
 from estimators.defaults import GRID, RECOGNITION, REFERENCE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
@@ -114,7 +114,7 @@ def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] |
     if not isinstance(weight, Mapping) or set(weight) != set(materials):
         raise InvalidSamples("prior", shown(prior), allowed)
     for value in weight.values():
-        check_number("prior", value, lambda found: 0.0 < found < math.inf, allowed)
+        check_number("prior", value, above_zero, allowed)
     total = sum(weight.values())
     return {name: float(np.log(value / total)) for name, value in weight.items()}
 

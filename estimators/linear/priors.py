@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.arguments import check_number, check_whole
+from estimators.arguments import above_zero, check_number, check_whole
 from estimators.defaults import POPULATION, PRIOR, REFERENCE, Prior
 from estimators.friction_model import Domain
 from estimators.linear.normal_mixture import mixture_quantile
@@ -29,11 +29,11 @@ class ScatterPrior:
     materials: int = 0
 
     def __post_init__(self) -> None:
-        of = "of the prior of scatter"
-        check_number(f"scale {of}", self.scale, lambda value: 0.0 < value < math.inf, "above 0 and finite")
-        freedom = f"degrees_of_freedom {of}", self.degrees_of_freedom
-        check_number(*freedom, lambda value: 1.0 <= value < math.inf, "1 or more")
-        check_whole(f"materials {of}", self.materials, 0)
+        where = "of the prior of scatter"
+        check_number(f"scale {where}", self.scale, above_zero, "above 0 and finite")
+        name = f"degrees_of_freedom {where}"
+        check_number(name, self.degrees_of_freedom, lambda value: 1.0 <= value < math.inf, "1 or more")
+        check_whole(f"materials {where}", self.materials, 0)
 
     def __str__(self) -> str:
         law = f"tau ~ half-Student-t on {self.degrees_of_freedom:.3g} degrees of freedom with scale {self.scale:.3g}"
@@ -104,7 +104,7 @@ def positive_friction() -> str:
 def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1, slope: float = 0.0) -> str:
     """The prior of the hierarchical model of grasps of so many ``sensors``, in words and numbers.
 
-    ``slope``: the precision, (m/s)², of what is assumed of β₁ beside it where the data do not show it.
+    ``slope``: the precision, (m/s)², of a further prior of β₁ (``assumed_slope``); 0 where there is none.
     """
     assumed = f"beta1 ~ N(0, ({1.0 / math.sqrt(slope):.3g} s/m)^2) besides; " if slope > 0.0 else ""
     gains = (
