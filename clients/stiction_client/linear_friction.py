@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
 
 VELOCITIES, FORCES = (0.0, 1e3, "m/s, as a magnitude"), (0.0, 1e300, "N an element")
-"""At which velocities and normal forces a model may be asked."""
+"""At which velocities and normal forces a model may be asked: least, greatest, unit."""
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""
@@ -340,7 +340,7 @@ class LinearFriction:
 
     @property
     def subject(self) -> str:
-        """What its friction is of, as messages say it."""
+        """Whose friction it is, as messages name it."""
         return "the surface"
 
     @property
@@ -403,13 +403,13 @@ class LinearFriction:
     def _point(
         self, tangential_velocity: ArrayLike, normal_force: ArrayLike, check: Callable[..., Number] = within
     ) -> tuple[Number, Number]:
-        """Velocity, m/s, and normal force, N an element, at which friction is asked for; raises ``refusal`` for what is
-        no magnitude, by the ``check`` of each.
+        """Velocity, m/s, and normal force, N an element, at which friction is asked for.
+
+        ``check``: ``within`` takes arrays, ``number`` only one number of each. Raises ``refusal`` outside their ranges.
         """
         try:
-            return check("tangential_velocity", tangential_velocity, *self.velocities), check(
-                "normal_force", normal_force, *FORCES
-            )
+            velocity = check("tangential_velocity", tangential_velocity, *self.velocities)
+            return velocity, check("normal_force", normal_force, *FORCES)
         except InvalidArgument as error:
             raise self.refusal(error.name, error.value, error.allowed) from None
 
@@ -426,15 +426,15 @@ class LinearFriction:
         return self._number("elements", elements, 1.0, "the number of elements of the contact, at least 1")
 
     def _number(self, name: str, value: object, least: float, allowed: str) -> float:
-        """A finite number of ``least`` or more."""
-        is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not is_number or not least <= value <= sys.float_info.max:  # type: ignore[operator]
-            raise self.refusal(name, shown(value), allowed)
-        return float(value)  # type: ignore[arg-type]
+        """A finite number of ``least`` or more; raises ``refusal`` for any other value."""
+        try:
+            return number(name, value, least, sys.float_info.max)
+        except InvalidArgument as error:
+            raise self.refusal(name, error.value, allowed) from None
 
 
 def check_model(model: object, name: str = "model") -> None:
-    """Raises ``InvalidArgument`` for what is no fitted model, by its ``name``."""
+    """Raises ``InvalidArgument``, with the argument's ``name``, for a value that is no fitted model."""
     if not isinstance(model, LinearFriction):
         allowed = "a FrictionModel, as FrictionClient.model(name) gives it, FrictionModel.load, or estimators.fit"
         raise InvalidArgument(name, shown(model), allowed)

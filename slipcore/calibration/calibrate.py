@@ -21,9 +21,11 @@ def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | Non
     """What is wrong with a sensor, from logs of a body pressed straight down on it and lifted.
 
     ``known_force``: for each log the total normal force of its hold, N, or None: then what the log's gripper reports,
-    if it does. Each quantity has its interval, or says why it is not identified. Raises ``InvalidInput`` for what are
-    no such forces or logs, and for logs of several sensors or lattices, ``UnknownScale`` for lengths that are not in
-    metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
+    if it does. Each quantity has its interval, or says why it is not identified.
+
+    Raises ``InvalidInput`` for logs or forces of another kind or number and for logs of several sensors or lattices,
+    ``UnknownScale`` for lengths that are not in metres, and ``InvalidPress`` for logs that are not pure presses, with
+    what was seen in each.
     """
     check_kinds(logs)
     _check_alike(logs)

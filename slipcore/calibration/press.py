@@ -30,7 +30,7 @@ class InvalidPress(InvalidInput):
 
 
 def check_kinds(logs: Sequence[GraspLog]) -> None:
-    """Raises ``InvalidInput`` for what is no list of logs, and for one without any."""
+    """Raises ``InvalidInput`` unless ``logs`` is a list of logs, and has one or more."""
     if isinstance(logs, GraspLog) or not isinstance(logs, Sequence):
         raise InvalidInput("logs", shown(logs), "a list of logs")
     if not logs:

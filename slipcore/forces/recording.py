@@ -90,7 +90,7 @@ def error(data: FloatArray, seen: BoolArray, noise: float) -> FloatArray:
 
 
 def checked_noise(noise: float) -> float:
-    """Noise (m) of a marker's coordinate; raises ``InvalidInput`` for what is none."""
+    """Noise (m) of a marker's coordinate; raises ``InvalidInput`` for any other value."""
     allowed = "0 m or more, finite"
     value = number("noise", noise, allowed)
     if not 0.0 <= value < np.inf:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import fftconvolve
 
+from slipcore.arguments import shown
 from slipcore.contact.defaults import WORLD
 from slipcore.contact.effects.sensor_sampling import SensorSampling
 from slipcore.contact.elasticity.grid import Grid
@@ -103,10 +104,9 @@ class World:
     force_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("friction", "pressure"):
-            given = getattr(self, name)
-            if not isinstance(given, np.ndarray) and (name, given) != ("pressure", None):
-                raise InvalidInput(name, repr(given)[:60], "an array, of a value at each of the sensor's points")
+        _check_array("friction", self.friction)
+        if self.pressure is not None:
+            _check_array("pressure", self.pressure)
         shape = self.friction.shape
         if len(shape) != 3 or shape[0] not in (1, 2) or shape[1:] != self.sampling.points:
             raise InvalidInput("friction", f"of shape {list(shape)}", f"[1 or 2 fingers, {self.sampling.points}]")
@@ -319,6 +319,11 @@ def _depth(body: HalfSpace, grid: Grid, force: FloatArray) -> FloatArray:
     assert quadrant is not None  # whatever presses displaces
     table = quadrant.T[np.ix_(*(abs(np.arange(1 - count, count)) for count in (n, m)))]
     return np.asarray(fftconvolve(table, force / grid.cell_area, mode="valid"))
+
+
+def _check_array(name: str, given: object) -> None:
+    if not isinstance(given, np.ndarray):
+        raise InvalidInput(name, shown(given), "an array, of a value at each of the sensor's points")
 
 
 def _check_stiffness(world: World, normal_force: float, mass: float, length: float) -> None:

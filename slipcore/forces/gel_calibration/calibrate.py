@@ -120,11 +120,13 @@ def _checked(
     depth: float,
     uneven: Sequence[Sequence[float]] | None,
 ) -> tuple[Elasticity, ThicknessMap | None]:
-    """What is given, NaN where nothing is, and the map; raises ``InvalidInput`` for what no gel has."""
+    """The given elasticity, NaN where none is given, and the map; raises ``InvalidInput`` for what no gel has."""
     usual = GEL_CALIBRATION.first_ratio if ratio is None else ratio
-    thick = math.inf if uneven is None else GEL.marker_depth / GEL.relative_thickness[0]  # more than any, and finite
-    thickest_or_given = thick if thickness is None else thickness
-    gel = Gel(1e6 if young is None else young, usual, thickest_or_given, depth, uneven)  # type: ignore[arg-type]
+    if thickness is None:  # thicker than any marker is deep, and finite where a map says what part of it
+        thickness_tried = math.inf if uneven is None else GEL.marker_depth / GEL.relative_thickness[0]
+    else:
+        thickness_tried = thickness
+    gel = Gel(1e6 if young is None else young, usual, thickness_tried, depth, uneven)  # type: ignore[arg-type]
     closeness = math.nan if thickness is None else 1.0 / gel.thickness
     return Elasticity(math.nan if ratio is None else gel.poisson_ratio, closeness), gel.relative_thickness
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any
 
-from slipcore.arguments import number
+from slipcore.arguments import number, shown
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import GEL
 
@@ -57,7 +57,7 @@ class Gel:
         return self.thickness if rows is None else self.thickness * min(map(min, rows))
 
     def check_beside(self, pitch: float) -> None:
-        """Raises ``InvalidInput`` for a gel that is too thin for markers ``pitch`` m apart; for no pitch, too."""
+        """Raises ``InvalidInput`` where the gel is too thin for markers ``pitch`` m apart, or the pitch not above 0."""
         apart = number("pitch", pitch)
         _check("pitch", apart, 0.0 < apart < math.inf, "above 0 m, finite")
         least = GEL.thinness * apart
@@ -93,7 +93,7 @@ def _read(name: str, given: Any) -> Any:
     try:
         return None if given is None else tuple(tuple(number(name, value) for value in row) for row in given)
     except TypeError as error:
-        raise InvalidInput(name, repr(given)[:60], "rows of one number a marker") from error
+        raise InvalidInput(name, shown(given), "rows of one number a marker") from error
 
 
 def _check(name: str, value: float, allowed: bool, what: str) -> None:
