@@ -100,8 +100,8 @@ class Contact:
         )
 
     def as_forces(self, load: Number, torque: Number) -> tuple[Number, Number]:
-        """What it bears as tangential forces, N: one that is the same under any normal force, and the torque over its
-        arm under 1 N, where the arm grows. Without an arm no torque counts.
+        """Load and torque as two tangential forces, N, that add as root of squares: one that does not change with the
+        normal force, and one for a torque arm that grows with it, under 1 N. Without an arm no torque counts.
         """
         arm = self.arm(1.0)
         twist = torque / (arm + (arm == 0.0))

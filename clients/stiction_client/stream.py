@@ -40,15 +40,17 @@ ANSWER_TIMEOUT = 30.0
 class SlipStream:
     """One grasp, frame by frame; use it as a context manager.
 
-    ``url`` and ``key``, where None: those of ``STICTION_URL`` and ``STICTION_KEY``. ``position`` [n, m, 3] m at rest,
-    ``element_area`` m². Without a ``detector`` the service takes the one that suits
-    such frames. With ``keep`` the frames can be stored as a grasp log of
-    ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
-    ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
-    ``known``, and where it has none recognises which of ``materials`` this is; frames then need forces, or a ``sensor``
-    whose gel the service knows. A connection that breaks is taken up again, with the frames that were not answered.
-    Raises ``ConnectionFailed`` with the service's reason where it refuses, and ``AnswerTimedOut`` where an answer is
-    late: it may be waited for again; and ``InvalidArgument`` for what cannot be sent.
+    ``url`` and ``key``: by default those of ``STICTION_URL`` and ``STICTION_KEY``. ``position`` [n, m, 3] m at rest,
+    ``element_area`` m². Without a ``detector`` the service takes the one that suits such frames. With ``keep`` the
+    frames can be stored as a grasp log of ``material`` when they end (``finish``).
+
+    ``control``, the settings of a grip controller: each answer then has the ``command`` of a controller that runs in
+    the service. It begins with the ``material``'s model, unless ``known`` is false; where it has none it recognises
+    which of ``materials`` this is. Frames then need forces, or a ``sensor`` whose gel the service knows.
+
+    A connection that breaks is taken up again, with the frames that were not answered. Raises ``InvalidArgument`` for
+    what cannot be sent, ``ConnectionFailed`` with the service's reason where it refuses, and ``AnswerTimedOut`` where
+    an answer is late: it may be waited for again.
     """
 
     def __init__(
@@ -130,8 +132,8 @@ class SlipStream:
 
         ``command``: the normal force commanded to the gripper, N; who watches the stream sees it. ``gripper_force``:
         the one that it reports, N, with its standard ``gripper_force_deviation`` N: forces that the service
-        reconstructs add up to it. Raises ``InvalidArgument`` for what is no force, and no number or array of them; the
-        stream then goes on.
+        reconstructs add up to it. Raises ``InvalidArgument`` for a value that is no number or array of numbers, or a
+        force out of range; nothing is sent then, and the stream goes on.
         """
         frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": _number("time", time)}
         frame["displacement"] = _numbers("displacement", displacement).tobytes()
@@ -273,7 +275,9 @@ class SlipStream:
 
 
 def _numbers(name: str, value: ArrayLike) -> FloatArray:
-    """As a message has them; raises ``InvalidArgument`` for anything else, that the service ends no stream for it."""
+    """The array as a message has it; raises ``InvalidArgument`` for anything else, for which the service would end the
+    stream.
+    """
     found = as_array(name, value)
     if found.dtype.kind not in "iuf" or not found.ndim:
         raise InvalidArgument(name, shown(value), "an array of numbers")

@@ -30,8 +30,8 @@ UNNAMED_SENSOR = "unknown"
 ELEMENT_AREAS = "element_areas"
 """Diagnostic, a sentence: elements of the material's grasps differ in their area, and of which one forces are."""
 SLOWEST_SLIP = "slowest_slip"
-"""Diagnostic, m/s: slower than that hardly any sample slid, of a model whose samples do not show how friction changes
-with velocity, so that slower its slope is an assumption."""
+"""Diagnostic, m/s, of a model whose samples do not show how friction changes with velocity: hardly any slid slower.
+Below it friction rests on an assumption."""
 ASSUMED_CHANGE = "assumed_change"
 """Diagnostic, a sentence: by how much friction is assumed to change between rest and the speed of slip."""
 SAME_GRASPS = "same_grasps"
@@ -220,8 +220,8 @@ def within(model: Model, tangential_velocity: Number, normal_force: Number) -> t
 
 
 def slowest_shown(model: Model) -> float:
-    """The least v, m/s, of which the data show friction: 0, as the limit v → 0, where they show how velocity changes
-    it, else that of the slowest slip.
+    """The least v, m/s, at which the data show friction: 0, the limit at rest, where they show how friction changes
+    with velocity; else the velocity of the slowest slip.
     """
     return float(model.diagnostics.get(SLOWEST_SLIP) or 0.0)
 

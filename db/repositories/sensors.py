@@ -71,8 +71,8 @@ def count_logs(session: Session, ids: Collection[int]) -> dict[int, int]:
 
 
 def element_area(session: Session, sensor_id: int) -> float | None:
-    """Area of its smallest elements, m², by the logs in which slip was looked for, else by its newest calibration; None
-    where neither is there.
+    """Area of a sensor's smallest elements, m²: of the logs in which slip was looked for, else of its newest
+    calibration; None where it has neither.
     """
     by_logs = select(func.min(SampleSummaryRow.element_area)).join(GraspLogRow)
     found = session.scalar(by_logs.where(GraspLogRow.sensor_id == sensor_id))

@@ -56,14 +56,15 @@ class FitInProgress(Exception):
 
 
 def methods_of(method: str | None, grid: tuple[int, int]) -> tuple[str, str]:
-    """By which slip may be found on so many markers, in frames without forces and with them."""
+    """The detectors of a session on so many markers: that of frames without forces, and that of frames with them."""
     without, with_forces = (method or method_with_displacement(grid, measures) for measures in (False, True))
     return without, with_forces
 
 
 def prepare(*methods: str) -> None:
-    """Load the kernels that first frames wait for by these methods, or compile them, which takes minutes; raises
-    ``InvalidInput`` for a method that there is not.
+    """Load the kernels of these methods, or compile them, which takes minutes, so that no frame waits for them.
+
+    Raises ``InvalidInput`` for an unknown method.
     """
     for method in dict.fromkeys(methods):
         warm_up_step(method)

@@ -41,7 +41,7 @@ TAKE_OVER_SECONDS = 5.0
 """s that the connection before may take to let go of a session with which another one goes on."""
 
 PREPARE_SECONDS = 25.0
-"""s that a session waits for the kernels of its detector: longer than loading them, and shorter than clients wait."""
+"""s that a new session waits for the kernels of its detector: loading them takes less, and clients wait longer."""
 
 LEAST_PAUSE, MOST_PAUSE = 0.005, 0.1
 """s until a frame that came too fast is tried again."""
@@ -151,17 +151,18 @@ class Streams:
         return session
 
     async def _prepare(self, methods: tuple[str, ...]) -> None:
-        """See that the process has the kernels of these methods; raises ``End`` where they are not there in time."""
+        """Wait until the process has the kernels of these methods; raises ``End`` where that takes too long."""
         if methods in self._prepared:
             return
         preparing = self._preparing.get(methods)
         if preparing is None:
             preparing = asyncio.create_task(self.call(detectors.prepare, *methods, is_long=True))
-            preparing.add_done_callback(lambda done: done.cancelled() or done.exception())  # though nobody waits for it
+            preparing.add_done_callback(lambda done: done.cancelled() or done.exception())  # read, as nobody may wait
             self._preparing[methods] = preparing
         await asyncio.wait({preparing}, timeout=PREPARE_SECONDS)
         if not preparing.done():
-            raise End(NOT_READY, "the detector is being compiled, minutes after an installation; open again in 30 s")
+            reason = "the detector is being compiled, which takes minutes after an installation; open again in 30 s"
+            raise End(NOT_READY, reason)
         self._preparing.pop(methods, None)
         preparing.result()
         self._prepared.add(methods)

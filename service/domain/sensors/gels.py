@@ -44,7 +44,7 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
 
 
 def _check_beside(gel: Gel, element_area: float | None) -> None:
-    """Raises ``InvalidValue`` for a gel by which no forces follow on elements of this area, m², where it is known."""
+    """Raises ``InvalidValue`` where the gel is too thin for elements of this area, m²; None: the area is not known."""
     if element_area is None:
         return
     from slipcore.forces import Gel as Mechanics  # which loads numerics
