@@ -1,11 +1,14 @@
 """What a scene is made of: a finger, a press, friction and the effects that it calls for; and its plan."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
+from slipcore.arguments import of_kind, shown
 from slipcore.contact.defaults import RAMP, SCENE
 from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.plan.entries import check_finite, check_types
 from slipcore.contact.plan.plan import Effect, Plan, ramp
 from slipcore.contact.solver.problem import ContactProblem, HeightField
 from slipcore.errors import InvalidInput
@@ -27,9 +30,14 @@ class Finger:
     thickness: float = float("inf")
 
     def __post_init__(self) -> None:
+        _check_own_types(self)
         for name in ("radius", "thickness"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInput(f"{name} of the finger", getattr(self, name), "above 0 m, inf for none")
+        if not 0.0 < self.young_modulus < np.inf:
+            raise InvalidInput("young_modulus of the finger", self.young_modulus, "finite and above 0 Pa")
+        if not 0.0 <= self.poisson_ratio <= 0.5:
+            raise InvalidInput("poisson_ratio of the finger", self.poisson_ratio, "0 to 0.5")
 
     def height(self) -> HeightField:
         """Gap to a flat object."""
@@ -49,8 +57,11 @@ class Press:
     duration: float = SCENE.press_duration
 
     def __post_init__(self) -> None:
+        _check_own_types(self)
         if not 0.0 <= self.force < np.inf:
             raise InvalidInput("press.force", self.force, "finite and at least 0 N")
+        if not 0.0 < self.duration < np.inf:
+            raise InvalidInput("press.duration", self.duration, "finite and above 0 s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +81,12 @@ class SceneDescription:
     description: str = ""
 
     def __post_init__(self) -> None:
+        _check_own_types(self)
+        of_kind("finger", self.finger, Finger)
+        of_kind("press", self.press, Press)
         if not 0.0 < self.duration < np.inf:
             raise InvalidInput("duration", self.duration, "finite and above 0 s")
+        _check_effects(self.effects)
         self.plan()
 
     def plan(self, seed: int = 0) -> Plan:
@@ -99,3 +114,19 @@ class SceneDescription:
     def references(self) -> tuple[str, ...]:
         """The papers behind the effects that are present; none of an effect that this package does not know."""
         return cited(*(EFFECTS.get(type(effect).__name__, ()) for effect in self.present()))
+
+
+def _check_own_types(record: Any) -> None:
+    check_types(type(record), {entry.name: getattr(record, entry.name) for entry in fields(record)})
+
+
+def _check_effects(effects: Any) -> None:
+    """What is no effect is refused, and so is an effect whose entries are not what they must be."""
+    if not isinstance(effects, tuple | list):
+        raise InvalidInput("effects", shown(effects), "a tuple of effects, such as (Torsion(0.01),)")
+    for effect in effects:
+        if isinstance(effect, type) or not (hasattr(effect, "absent") and hasattr(effect, "why")):
+            raise InvalidInput("effect", shown(effect), "an object such as Torsion(0.01)")
+        if is_dataclass(effect):
+            _check_own_types(effect)
+            check_finite(effect)

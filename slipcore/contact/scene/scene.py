@@ -2,12 +2,14 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+from slipcore.arguments import of_kind, shown
 from slipcore.contact.effects import EFFECTS
 from slipcore.contact.plan.description import Finger, Press, SceneDescription
+from slipcore.contact.plan.entries import check_types
 from slipcore.contact.plan.plan import Effect
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.explain import Explanation, explain
@@ -23,10 +25,11 @@ class Scene(SceneDescription):
     @classmethod
     def from_toml(cls, path: str | Path) -> Self:
         """Read a scene file; a bare name is one of the library's."""
+        of_kind("scene", path, str | Path)
         asked = path = Path(path)
         if not path.suffix and not path.exists():
             path = LIBRARY / f"{path}.toml"
-        if not path.exists():
+        if not path.is_file():
             raise InvalidInput("scene", asked, "a TOML file, or one of " + ", ".join(library()))
         try:
             entries = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -37,10 +40,17 @@ class Scene(SceneDescription):
     @classmethod
     def from_mapping(cls, entries: Mapping[str, Any]) -> Self:
         """A scene from the entries of a scene file; effects are tables with a ``kind``."""
-        entries = dict(entries)
-        effects = tuple(_effect(dict(table)) for table in entries.pop("effect", ()))
-        parts = {name: _record(kind, entries.pop(name)) for name, kind in _PARTS.items() if name in entries}
-        return _record(cls, entries | parts | {"effects": effects})
+        for name in entries:
+            if name not in _ENTRIES:
+                raise InvalidInput("entry of a scene", name, ", ".join(_ENTRIES))
+        own = {name: value for name, value in entries.items() if name != "effect"}
+        for name, kind in _PARTS.items():
+            if name in own:
+                own[name] = _record(kind, _table(name, own[name]))
+        tables = entries.get("effect", ())
+        if not isinstance(tables, list | tuple):
+            raise InvalidInput("effect", shown(tables), "one table for each effect, under [[effect]]")
+        return _record(cls, own | {"effects": tuple(_effect(_table("effect", table)) for table in tables)})
 
     def explain(self, seed: int = 0, progress: Progress = no_progress, *, all_runs: bool = False) -> Explanation:
         """What each effect is there for, what it costs and what leaving it out would change, by coarse runs.
@@ -52,11 +62,18 @@ class Scene(SceneDescription):
 
 Record = TypeVar("Record")
 _PARTS: dict[str, type[Any]] = {"finger": Finger, "press": Press}
+_ENTRIES = ("name", "description", "friction", "duration", "finger", "press", "effect")
 
 
 def library() -> list[str]:
     """Names of the scenes that come with the package."""
     return sorted(path.stem for path in LIBRARY.glob("*.toml"))
+
+
+def _table(name: str, value: object) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InvalidInput(name, shown(value), "a table of entries")
+    return dict(value)
 
 
 def _effect(table: dict[str, Any]) -> Effect:
@@ -67,15 +84,16 @@ def _effect(table: dict[str, Any]) -> Effect:
 
 
 def _record(kind: type[Record], entries: Mapping[str, Any]) -> Record:
-    """A record from a table, refused where the table has a key that the record has not."""
+    """A record from a table, refused where the table lacks an entry, or has one of another name or type."""
     known = [entry.name for entry in fields(kind)]  # type: ignore[arg-type]
     for name in entries:
         if name not in known:
             raise InvalidInput(f"entry of {kind.__name__}", name, ", ".join(known))
-    try:
-        return kind(**{name: _frozen(value) for name, value in entries.items()})
-    except TypeError as error:
-        raise InvalidInput(kind.__name__, entries, f"all of its entries, of their types ({error})") from error
+    for entry in fields(kind):  # type: ignore[arg-type]
+        if entry.name not in entries and entry.default is MISSING and entry.default_factory is MISSING:
+            raise InvalidInput(f"{entry.name} of {kind.__name__}", "missing", "an entry with that name")
+    check_types(kind, entries)
+    return kind(**{name: _frozen(value) for name, value in entries.items()})
 
 
 def _frozen(value: Any) -> Any:

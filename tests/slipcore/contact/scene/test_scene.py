@@ -60,6 +60,21 @@ def test_a_scene_file_is_the_scene_written_in_python(tmp_path) -> None:
         ({"name": "a", "effect": [{"kind": "Torsion", "twist": 1.0}]}, "twist"),
         ({"name": "a", "effect": [{"kind": "Torsion"}]}, "Torsion"),
         ({"name": "a", "friction": -0.1}, "friction"),
+        ({"name": "a", "friction": "0.4"}, "friction of Scene is '0.4'; allowed: a number"),
+        ({"name": "a", "friction": True}, "friction of Scene is True"),
+        ({"name": 5}, "name of Scene is 5"),
+        ({"friction": 0.4}, "name of Scene is missing"),
+        ({"name": "a", "finger": "soft"}, "finger is 'soft'; allowed: a table"),
+        ({"name": "a", "finger": {"poisson_ratio": -1}}, "poisson_ratio of the finger is -1; allowed: 0 to 0.5"),
+        ({"name": "a", "finger": {"young_modulus": -1}}, "young_modulus of the finger is -1"),
+        ({"name": "a", "press": 5}, "press is 5; allowed: a table"),
+        ({"name": "a", "press": {"duration": -1}}, "press.duration is -1"),
+        ({"name": "a", "effect": {"kind": "Torsion", "moment": 1e-3}}, r"under \[\[effect\]\]"),
+        ({"name": "a", "effect": ["Torsion"]}, "effect is 'Torsion'; allowed: a table"),
+        ({"name": "a", "effects": [{"kind": "Torsion", "moment": 1e-3}]}, "is effects; allowed: .* effect$"),
+        ({"name": "a", "effect": [{"kind": "TangentialLoad", "force": [1, 0, 5]}]}, "force .*allowed: 2 numbers"),
+        ({"name": "a", "effect": [{"kind": "SensorSampling", "points": [2.5, 20]}]}, "points .*a whole number"),
+        ({"name": "a", "effect": [{"kind": "SphereSurface", "curvature": float("nan")}]}, "curvature of SphereSurface"),
     ],
 )
 def test_what_a_scene_file_cannot_mean_is_refused_by_name(entries: dict, named: str) -> None:
@@ -70,6 +85,30 @@ def test_what_a_scene_file_cannot_mean_is_refused_by_name(entries: dict, named: 
 def test_a_missing_scene_names_the_library() -> None:
     with pytest.raises(InvalidInput, match="TOML"):
         Scene.from_toml("no_such_scene")
+
+
+def test_a_folder_or_a_number_is_no_scene_file(tmp_path) -> None:
+    for wrong in (tmp_path, 5, None):
+        with pytest.raises(InvalidInput, match="scene is"):
+            Scene.from_toml(wrong)
+
+
+@pytest.mark.parametrize(
+    ("entries", "named"),
+    [
+        ({"friction": "0.4"}, "friction of Scene"),
+        ({"duration": "1"}, "duration of Scene"),
+        ({"finger": 5}, "finger is 5"),
+        ({"press": 10.0}, "press is 10.0"),
+        ({"effects": None}, "effects is None"),
+        ({"effects": ("Torsion",)}, "effect is 'Torsion'"),
+        ({"effects": (FlatSurface,)}, "effect is <class"),
+        ({"effects": (TangentialLoad((1.0, True)),)}, "force of TangentialLoad"),
+    ],
+)
+def test_a_scene_in_python_is_refused_as_one_in_a_file(entries: dict, named: str) -> None:
+    with pytest.raises(InvalidInput, match=named):
+        Scene("a", **entries)
 
 
 def test_points_are_cell_centres_and_elements_sums_of_cells() -> None:
