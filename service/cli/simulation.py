@@ -51,7 +51,10 @@ def simulate(
     from slipcore.contact import Scene
 
     wanted = Scene.from_toml(scene)
+    if explain and not (output is None and picture is None):
+        raise typer.BadParameter("--explain makes no log; allowed: --output and --picture without it")
     if output is not None:
+        _check_output(output)
         refuse_inputs(output, Path(scene))
     if explain:
         _explain(wanted, seed, json, all_runs=yes)
@@ -70,6 +73,14 @@ def simulate(
     _print(log, wanted.name, json)
     if ended:
         raise typer.Exit(INTERRUPTED)
+
+
+def _check_output(path: Path) -> None:
+    """Raises ``InvalidInput`` for what cannot become the NPZ, before anything is simulated."""
+    from slipcore import InvalidInput
+
+    if path.suffix.lower() != ".npz" or path.is_dir():
+        raise InvalidInput("output", f"{path}, a folder" if path.is_dir() else path, "a file that ends in .npz")
 
 
 def _simulated(scene: "Scene", asked: "RequestedAccuracy", seed: int) -> "tuple[GraspLog, bool]":
@@ -108,8 +119,9 @@ def campaign(
     from slipcore.contact import Scene
 
     wanted = [Scene.from_toml(scene) for scene in scenes]
+    asked = RequestedAccuracy(accuracy, seconds, tier)
     with workers(processes or os.cpu_count() or 1, dask_address) as executor:
-        outcomes = run(executor, wanted, range(seeds), output, RequestedAccuracy(accuracy, seconds, tier), written_as)
+        outcomes = run(executor, wanted, range(seeds), output, asked, written_as)
         made = list(counted(outcomes, len(wanted) * seeds, "logs"))
     _print_campaign(made, output, json)
     if any(outcome.refused for outcome in made):

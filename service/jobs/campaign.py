@@ -21,6 +21,7 @@ from service.observability import logs
 from service.processes import spawned
 from service.whole_files import write_whole
 from slipcore.contact import Scene, simulate
+from slipcore.contact.tiers.choice import check_request
 from slipcore.errors import InvalidInput, SlipcoreError
 from slipcore.frames import GraspLog
 
@@ -32,11 +33,17 @@ FORMATS = ("npz", "parquet")
 
 @dataclass(frozen=True, slots=True)
 class RequestedAccuracy:
-    """What each log is simulated to, as ``slipcore.contact.simulate`` takes it: ``seconds`` in s."""
+    """What each log is simulated to, as ``slipcore.contact.simulate`` takes it: ``seconds`` in s.
+
+    Raises ``InvalidInput``.
+    """
 
     accuracy: float | None = None
     seconds: float | None = None
     tier: str | None = None
+
+    def __post_init__(self) -> None:
+        check_request(self.accuracy, self.seconds, self.tier)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +78,11 @@ def workers(processes: int, dask_address: str | None = None) -> Iterator[Executo
 def _cluster(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client
+        from distributed.comm.addressing import get_address_host
     except ModuleNotFoundError as error:
         raise DriverMissing(address, error.name or str(error), "Dask cluster", "dask") from error
     try:
+        get_address_host(address)  # before there is a client, whose end fails where it never began
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise InvalidInput("Dask address", address, "one at which a scheduler answers") from error

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Observed
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -21,6 +22,7 @@ class DroppedFrames(Observed):
     stage: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not 0.0 <= self.probability < 1.0:
             raise InvalidInput("probability of a lost frame", self.probability, "0 to below 1")
 

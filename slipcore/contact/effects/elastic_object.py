@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from slipcore.contact.defaults import SCENE
 from slipcore.contact.elasticity.influence import HalfSpace, MirroredBody
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 
@@ -20,6 +21,7 @@ class ElasticObject:
     cost: ClassVar[str] = "two applications a step, to separate the finger's displacement from the object's"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.young_modulus > 0.0:
             raise InvalidInput("Young's modulus of the object", self.young_modulus, "above 0 Pa, inf for a rigid one")
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 
@@ -18,6 +19,7 @@ class FiniteLayer:
     cost: ClassVar[str] = "influence functions, made once a grid; nothing a step"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.thickness > 0.0:
             raise InvalidInput("thickness of the layer", self.thickness, "above 0 m, inf for a half-space")
 

@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
@@ -22,6 +23,7 @@ class FrictionPatch:
     cost: ClassVar[str] = "nothing: one field, made before the first step"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.radius > 0.0:
             raise InvalidInput("radius of the friction patch", self.radius, "above 0 m")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Observed
 from slipcore.errors import InvalidInput
 
@@ -19,6 +20,7 @@ class Noise(Observed):
     stage: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not 0.0 <= self.scale < float("inf"):
             raise InvalidInput(f"scale of {self.of} noise", self.scale, f"at least 0 {self.unit}")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
@@ -19,6 +20,7 @@ class PressureFriction:
     cost: ClassVar[str] = "nothing: the limit is known before the tangential step"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.element_area > 0.0:
             raise InvalidInput("element_area", self.element_area, "above 0 m²")
 

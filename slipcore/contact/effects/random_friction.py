@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from slipcore.contact.defaults import SCENE
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
@@ -27,6 +28,7 @@ class RandomFriction:
     cost: ClassVar[str] = "nothing: one field, made before the first step"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.scale >= 0.0:
             raise InvalidInput("scale of random friction", self.scale, "at least 0")
         if not self.correlation_length > 0.0:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from slipcore.contact.defaults import RAMP
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.errors import InvalidInput
 
@@ -23,6 +24,7 @@ class SensorSampling:
     cost: ClassVar[str] = "nothing: points are cell centres, elements are sums of cells"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if min(self.points) < 2:
             raise InvalidInput("points of the sensor", self.points, "at least 2 each way")
         if not (self.pitch > 0.0 and self.frame_rate > 0.0):

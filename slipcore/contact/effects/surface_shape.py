@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import interpolate
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.problem import HeightField
 from slipcore.errors import InvalidInput
@@ -77,6 +78,7 @@ class FlatSurface:
     cost: ClassVar[str] = COST
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not min(self.width) > 0.0:
             raise InvalidInput("width of the face", self.width, "above 0 m")
 
@@ -105,6 +107,7 @@ class RingSurface:
     cost: ClassVar[str] = COST
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not (self.radius > 0.0 and self.tube_radius > 0.0):
             raise InvalidInput("ring", self, "radii above 0 m")
 
@@ -134,6 +137,7 @@ class WavySurface:
     cost: ClassVar[str] = COST
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if not self.wavelength > 0.0:
             raise InvalidInput("wavelength", self.wavelength, "above 0 m")
 
@@ -167,8 +171,9 @@ class MeasuredSurface:
     cost: ClassVar[str] = COST
 
     def __post_init__(self) -> None:
-        if len({len(row) for row in self.heights}) != 1 or min(len(self.heights), len(self.heights[0])) < 2:
-            raise InvalidInput("measured heights", "ragged or too small", "a rectangle of at least 2 × 2")
+        check_own_types(self)
+        if min(len(self.heights), len(self.heights[0])) < 2:
+            raise InvalidInput("measured heights", "too small", "a rectangle of at least 2 × 2")
         if not np.isfinite(self.heights).all():
             raise InvalidInput("measured heights", "not finite", "finite heights, m")
         if not self.pitch > 0.0:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.problem import MaxwellBranch
 from slipcore.errors import InvalidInput
@@ -22,6 +23,7 @@ class Viscoelasticity:
     cost: ClassVar[str] = "two applications a step and one kept field a branch"
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if len(self.strength) != len(self.time):
             raise InvalidInput("strength and time", f"{len(self.strength)} and {len(self.time)}", "as many of each")
 

@@ -1,6 +1,6 @@
 """What a scene is made of: a finger, a press, friction and the effects that it calls for; and its plan."""
 
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from slipcore.arguments import of_kind, shown
 from slipcore.contact.defaults import RAMP, SCENE
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.plan.entries import check_finite, check_types
+from slipcore.contact.plan.entries import check_finite, check_own_types
 from slipcore.contact.plan.plan import Effect, Plan, ramp
 from slipcore.contact.solver.problem import ContactProblem, HeightField
 from slipcore.errors import InvalidInput
@@ -30,7 +30,7 @@ class Finger:
     thickness: float = float("inf")
 
     def __post_init__(self) -> None:
-        _check_own_types(self)
+        check_own_types(self)
         for name in ("radius", "thickness"):
             if not getattr(self, name) > 0.0:
                 raise InvalidInput(f"{name} of the finger", getattr(self, name), "above 0 m, inf for none")
@@ -57,7 +57,7 @@ class Press:
     duration: float = SCENE.press_duration
 
     def __post_init__(self) -> None:
-        _check_own_types(self)
+        check_own_types(self)
         if not 0.0 <= self.force < np.inf:
             raise InvalidInput("press.force", self.force, "finite and at least 0 N")
         if not 0.0 < self.duration < np.inf:
@@ -81,7 +81,7 @@ class SceneDescription:
     description: str = ""
 
     def __post_init__(self) -> None:
-        _check_own_types(self)
+        check_own_types(self)
         of_kind("finger", self.finger, Finger)
         of_kind("press", self.press, Press)
         if not 0.0 < self.duration < np.inf:
@@ -116,10 +116,6 @@ class SceneDescription:
         return cited(*(EFFECTS.get(type(effect).__name__, ()) for effect in self.present()))
 
 
-def _check_own_types(record: Any) -> None:
-    check_types(type(record), {entry.name: getattr(record, entry.name) for entry in fields(record)})
-
-
 def _check_effects(effects: Any) -> None:
     """What is no effect is refused, and so is an effect whose entries are not what they must be."""
     if not isinstance(effects, tuple | list):
@@ -128,5 +124,5 @@ def _check_effects(effects: Any) -> None:
         if isinstance(effect, type) or not (hasattr(effect, "absent") and hasattr(effect, "why")):
             raise InvalidInput("effect", shown(effect), "an object such as Torsion(0.01)")
         if is_dataclass(effect):
-            _check_own_types(effect)
+            check_own_types(effect)
             check_finite(effect)

@@ -25,6 +25,11 @@ def check_types(kind: type[Any], entries: Mapping[str, Any]) -> None:
             _check(f"{entry.name} of {kind.__name__}", entry.type, entries[entry.name])
 
 
+def check_own_types(record: Any) -> None:
+    """``check_types`` of a record that is made: the first thing that it does with its entries."""
+    check_types(type(record), {entry.name: getattr(record, entry.name) for entry in fields(record)})
+
+
 def check_finite(record: Any) -> None:
     """Raises ``InvalidInput`` for a number of an effect that is NaN, or inf where that means nothing."""
     for entry in fields(record):

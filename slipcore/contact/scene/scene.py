@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
@@ -30,7 +31,9 @@ class Scene(SceneDescription):
         if not path.suffix and not path.exists():
             path = LIBRARY / f"{path}.toml"
         if not path.is_file():
-            raise InvalidInput("scene", asked, "a TOML file, or one of " + ", ".join(library()))
+            near = get_close_matches(asked.name, library())
+            known = f"such as {' or '.join(near)} (did you mean that?)" if near else f"one of {', '.join(library())}"
+            raise InvalidInput("scene", asked, f"a TOML file, or a scene of the library, {known}")
         try:
             entries = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from slipcore.arguments import of_kind
 from slipcore.contact.errors import Interrupted
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
@@ -13,7 +14,7 @@ from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.tiers import boundary_elements
 from slipcore.contact.tiers.accuracy import Refined, Stopped, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity
-from slipcore.contact.tiers.choice import cheapest, named
+from slipcore.contact.tiers.choice import cheapest, check_request, named
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -39,6 +40,9 @@ def simulate(
     be kept, with what can, ``NotConverged`` and ``InvalidInput``; ``Interrupted``, with the best log until then, where
     Ctrl-C ends a request that has one.
     """
+    of_kind("scene", scene, SceneDescription)
+    of_kind("fidelity", fidelity, Fidelity | None)
+    check_request(accuracy, seconds, tier)
     plan = scene.plan(seed)
     if fidelity is not None and (accuracy is not None or seconds is not None):
         raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")

@@ -11,13 +11,13 @@ from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.solver.warm_up import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.choice import check_request
 from slipcore.contact.tiers.difference import Difference as Difference
 from slipcore.contact.tiers.difference import difference as difference
 from slipcore.contact.tiers.extrapolation import grid_error, on_finer
 from slipcore.contact.tiers.probe import probe
 from slipcore.contact.tiers.requests import OutOfTime, Runs
 from slipcore.contact.tiers.sampling import frame_times
-from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
 
@@ -51,9 +51,7 @@ def simulate_to(
     ``NotConverged`` where the finest grid falls short after all; ``Stopped`` with the best log where Ctrl-C comes after
     the first.
     """
-    for name, value in (("accuracy", accuracy), ("seconds", seconds)):
-        if value is not None and not 0.0 < value < np.inf:
-            raise InvalidInput(name, value, "finite and above 0")
+    check_request(accuracy, seconds)
     search = _AccuracySearch(
         plan, 0.0 if accuracy is None else accuracy, np.inf if seconds is None else seconds, progress
     )
@@ -80,8 +78,7 @@ def refinements(plan: Plan, seconds: float, progress: Progress = no_progress) ->
     """Ever finer logs, as long as the next one fits into about ``seconds``; theirs are what a request for that accuracy
     takes, those of all coarser ones among them. There is a first one, whatever it takes.
     """
-    if not 0.0 < seconds < np.inf:
-        raise InvalidInput("seconds", seconds, "finite and above 0")
+    check_request(seconds=seconds)
     search = _AccuracySearch(plan, 0.0, seconds, progress, every=True)
     for found in search.logs():
         yield replace(found, seconds=search.runs.spent)

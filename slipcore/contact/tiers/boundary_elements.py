@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from slipcore.contact.defaults import FIDELITY, PROBE
+from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.solver.quasi_static import QuasiStatic
@@ -45,6 +46,7 @@ class Fidelity:
     aligned: bool = True
 
     def __post_init__(self) -> None:
+        check_own_types(self)
         if self.cells < 4 or self.substeps < 1 or not 0.0 < self.tolerance < 1.0:
             raise InvalidInput("fidelity", self, "4 cells or more, 1 substep or more, a tolerance between 0 and 1")
 

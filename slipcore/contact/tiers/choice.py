@@ -2,8 +2,10 @@
 
 from typing import Protocol
 
+from slipcore.arguments import shown
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
+from slipcore.contact.reference.checks import check_range
 from slipcore.contact.tiers import beam_lattice, closed_form
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -26,6 +28,17 @@ class Tier(Protocol):
 TIERS: tuple[Tier, ...] = (closed_form, beam_lattice)
 
 
+def check_request(accuracy: float | None = None, seconds: float | None = None, tier: str | None = None) -> None:
+    """Raises ``InvalidInput`` for an accuracy or ``seconds`` that are no finite number above 0, and an unknown tier."""
+    if accuracy is not None:
+        check_range("accuracy", accuracy, above=0.0)
+    if seconds is not None:
+        check_range("seconds", seconds, above=0.0, unit="s")
+    names = [*(each.NAME for each in TIERS), BOUNDARY_ELEMENTS]
+    if tier is not None and tier not in names:
+        raise InvalidInput("tier", shown(tier), ", ".join(names))
+
+
 def cheapest(scene: SceneDescription, plan: Plan, accuracy: float) -> Tier | None:
     """The cheapest tier that is as accurate as asked; None where that takes boundary elements."""
     for tier in TIERS:
@@ -40,10 +53,8 @@ def named(name: str, scene: SceneDescription, plan: Plan, accuracy: float | None
 
     Raises ``InvalidInput`` for a scene that it cannot do, or not as accurately as asked.
     """
-    known: dict[str, Tier | None] = {**{tier.NAME: tier for tier in TIERS}, BOUNDARY_ELEMENTS: None}
-    if name not in known:
-        raise InvalidInput("tier", name, ", ".join(known))
-    tier = known[name]
+    check_request(tier=name)
+    tier = next((each for each in TIERS if name == each.NAME), None)
     if tier is None:
         return None
     reached = tier.accuracy(scene, plan)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service.cli import simulation
+from service.cli import main, simulation
 from service.jobs.campaign import Outcome
 from slipcore import FrictionLaw, GraspLog
 from slipcore.frames import GroundTruth
@@ -73,3 +73,39 @@ def test_logs_of_a_campaign_are_told_in_order_with_what_was_refused(capsys: pyte
     simulation._print_campaign(made, folder, json=True)
     told = json.loads(capsys.readouterr().out)["logs"]
     assert told[2] == {"scene": "pull", "seed": 0, "path": "there/pull-0.npz", "refused": "too fast"}
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--accuracy=-1"], "accuracy is -1; allowed: above 0"),
+        (["--seconds=0"], "seconds is 0 s; allowed: above 0 s"),
+        (["--tier=nope"], "tier is 'nope'; allowed: closed form, beams, boundary elements"),
+    ],
+)
+def test_a_campaign_that_cannot_be_asked_for_leaves_its_folder_free(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], told: str
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["campaign", "table1_condition1", "--output", str(tmp_path / "new"), *options])
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("name", ["log.txt", "folder.npz"])
+def test_what_cannot_become_a_log_is_refused_before_it_is_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr(simulation, "_simulated", lambda *_: pytest.fail("simulated"))
+    (tmp_path / "folder.npz").mkdir()
+    with pytest.raises(SystemExit):
+        main(["simulate", "table1_condition1", "--output", str(tmp_path / name)])
+    assert "allowed: a file that ends in .npz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("written", ["--output=a.npz", "--picture=a.png"])
+def test_an_explanation_writes_no_log(capsys: pytest.CaptureFixture[str], written: str) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["simulate", "table1_condition1", "--explain", written])
+    assert left.value.code == 2
+    assert "--explain makes no log" in capsys.readouterr().err

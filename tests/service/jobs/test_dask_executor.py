@@ -1,5 +1,6 @@
 """Jobs on a real Dask cluster: its scheduler and its workers are processes of their own."""
 
+import gc
 import os
 import signal
 import socket
@@ -142,6 +143,16 @@ def test_a_campaign_names_a_scheduler_that_is_not_there(cluster: Cluster, monkey
     named = pytest.raises(InvalidInput, match=r"Dask address is .*; allowed: one at which a scheduler answers")
     with named, campaign.workers(1, cluster.address):
         pass
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("address", ["", "nonsense", "tcp://", "foo://there:1"])
+def test_an_address_that_is_none_is_refused_before_there_is_a_client(address: str) -> None:
+    began = time.monotonic()
+    with pytest.raises(InvalidInput, match="Dask address is"), campaign.workers(1, address):
+        pass
+    gc.collect()  # a client that never began waits 20 s for its end, which fails
+    assert time.monotonic() - began < 10.0
 
 
 def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(

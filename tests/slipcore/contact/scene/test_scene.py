@@ -1,11 +1,12 @@
 """Scene files, sampling and the log that comes out."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from slipcore.contact.effects import FlatSurface, SensorSampling, TangentialLoad
+from slipcore.contact.effects import EFFECTS, FlatSurface, LoadPath, MarkerNoise, SensorSampling, TangentialLoad
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.scene import Finger, Press, Scene, simulate
 from slipcore.contact.tiers.boundary_elements import Fidelity
@@ -85,6 +86,48 @@ def test_what_a_scene_file_cannot_mean_is_refused_by_name(entries: dict, named: 
 def test_a_missing_scene_names_the_library() -> None:
     with pytest.raises(InvalidInput, match="TOML"):
         Scene.from_toml("no_such_scene")
+
+
+def test_a_misspelt_scene_is_told_the_likely_ones_alone() -> None:
+    with pytest.raises(InvalidInput, match=r"table1_condition1.*did you mean") as refused:
+        Scene.from_toml("tabel1_condition1")
+    assert "household" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"scene": "x"}, "scene is 'x'; allowed: SceneDescription"),
+        ({"accuracy": "0.1"}, "accuracy is '0.1'; allowed: above 0"),
+        ({"accuracy": True}, "accuracy is True; allowed: above 0"),
+        ({"accuracy": 0.1, "tier": []}, "tier is .*; allowed: closed form"),
+        ({"seconds": "1"}, "seconds is '1'; allowed: above 0 s"),
+        ({"fidelity": 12}, "fidelity is 12; allowed: Fidelity or None"),
+    ],
+)
+def test_a_request_that_means_nothing_is_refused_by_name(given: dict, told: str) -> None:
+    with pytest.raises(InvalidInput, match=told):
+        simulate(**{"scene": Scene("a"), **given})
+
+
+def test_text_is_no_number_of_an_effect_or_a_fidelity() -> None:
+    with pytest.raises(InvalidInput, match="scale of MarkerNoise is 'x'; allowed: a number"):
+        MarkerNoise("x")
+    with pytest.raises(InvalidInput, match="cells of Fidelity is 'x'; allowed: a whole number"):
+        Fidelity(cells="x")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in EFFECTS.values() if fields(kind)])
+def test_every_effect_refuses_text_by_name(kind: type) -> None:
+    with pytest.raises(InvalidInput, match=f"of {kind.__name__} is"):
+        Scene("a", (kind(*["x"] * len(fields(kind))),))
+
+
+@pytest.mark.parametrize("late", [TangentialLoad((1.0, 0.0), start=2.0), LoadPath((3.0, 4.0), force_x=(0.0, 1.0))])
+def test_a_load_that_begins_when_all_is_over_is_refused(late: TangentialLoad | LoadPath) -> None:
+    Scene("a", (late,), duration=3.5)
+    with pytest.raises(InvalidInput, match=r"start of force_x is . s; allowed: before the end of the scene at 2 s"):
+        Scene("a", (late,), duration=2.0)
 
 
 def test_a_folder_or_a_number_is_no_scene_file(tmp_path) -> None:
