@@ -56,8 +56,8 @@ class GelIn(Body):
         Field(
             ge=1e-6,
             le=1.0,
-            description="m from the surface to the rigid base, at least a tenth of the distance between markers, which "
-            "is asked here where the sensor has logs, and else of its first log; null: thick against any contact",
+            description="m from the surface to the rigid base, at least a tenth of the distance between markers "
+            "(checked here where the sensor has logs, and else with its first log); null: thick against any contact",
         ),
     ] = None
     marker_depth: Annotated[float, Field(ge=0.0, lt=1.0, description="m of the markers below the surface")] = 0.0
