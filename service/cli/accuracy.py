@@ -1,7 +1,10 @@
 """The command that draws what accuracy costs: of a scene, of logs, or of a material of a service."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,9 +97,24 @@ def _of_logs(first: str, logs: "list[GraspLog]") -> "list[WorkPrecision]":
 def _of_material(name: str, url: str, key: str | None) -> "WorkPrecision":
     from service.report import work_precision
 
-    with connected(url, key) as client:
+    with _likely_scene(name), connected(url, key) as client:
         methods = sorted(client.material(name).models)
         return work_precision.of_models(name, [client.model(name, method) for method in methods])
+
+
+@contextmanager
+def _likely_scene(name: str) -> Iterator[None]:
+    """Say of a material that is not found, or asked of no service, which scenes are called much like it."""
+    from slipcore.contact import library
+    from stiction_client.errors import StictionError
+
+    try:
+        yield
+    except StictionError as error:
+        near = get_close_matches(name, library())
+        if near:
+            error.add_note(f"or was a scene meant: {' or '.join(near)}?")
+        raise
 
 
 def _tell(found: "list[WorkPrecision]", picture: Path | None, json: bool) -> None:

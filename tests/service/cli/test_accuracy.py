@@ -8,7 +8,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from service.cli import accuracy
+from service.cli import accuracy, main
 from service.report.work_precision import Setting, WorkPrecision
 from tests.service.report.test_material import MODEL
 
@@ -50,3 +50,14 @@ def test_the_models_of_a_material_are_asked_for_in_the_order_of_their_names(monk
 @pytest.mark.parametrize(("text", "is_scene"), [("a.toml", True), ("lifting_15N", True), ("a.npz", False)])
 def test_a_scene_is_known_by_its_ending_or_its_name(text: str, is_scene: bool) -> None:
     assert accuracy._is_scene(text) is is_scene
+
+
+def test_a_misspelt_scene_is_told_the_likely_ones_where_no_service_has_such_a_material(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["accuracy", "tabel1_condition1", "--url", "http://127.0.0.1:9"])
+    assert "or was a scene meant: table1_condition1 or" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["accuracy", "felt", "--url", "http://127.0.0.1:9"])
+    assert "scene meant" not in capsys.readouterr().err
