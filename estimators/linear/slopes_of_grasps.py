@@ -60,20 +60,39 @@ def _times(grasps: Sequence[GraspStatistics], within: FloatArray, found: Slopes,
     left = float(np.square(within[..., 2] - np.einsum("gij,gj->gi", found.axes, found.response)).sum())
     if samples <= places + slopes or left <= (ROUNDING * found.size[2]) ** 2:
         return 1.0
-    differ = min(_mean_square(found, factor) for factor in (np.ones(len(grasps)), _factors(grasps, law)))
-    return differ / (left / (samples - places - slopes))
+    own = left / (samples - places - slopes)
+    factor, unsure = _factors(grasps, law)
+    alike = _mean_square(found.regressors, found.response)
+    return min(alike, _mean_square(*_beside_levels(found, factor, unsure, own))) / own
 
 
-def _mean_square(found: Slopes, factor: FloatArray) -> float:
-    """Of what the slopes of grasps differ by, were they ``factor`` [g] times those of the law; 0 where none is left."""
-    rows, response = (factor[:, None, None] * found.regressors).reshape(-1, 2), found.response.ravel()
-    alike, _, rank, _ = np.linalg.lstsq(rows, response, rcond=CLUSTERS.alone)
+def _beside_levels(found: Slopes, factor: FloatArray, unsure: FloatArray, own: float) -> tuple[FloatArray, FloatArray]:
+    """Regressors and response of slopes that are ``factor`` [g] times those of the law, whitened.
+
+    A factor that is ``unsure`` [g], a variance, takes a grasp's slopes along those of the law, beside the samples'
+    ``own`` mean square: I + w·h·hᵀ in units of it, with h what the law's slopes make and w = unsure / own.
+    """
+    rows = factor[:, None, None] * found.regressors
+    law = np.linalg.lstsq(rows.reshape(-1, 2), found.response.ravel(), rcond=CLUSTERS.alone)[0]
+    along = found.regressors @ law
+    square = np.square(along).sum(axis=1)
+    lost = 1.0 - 1.0 / np.sqrt(1.0 + unsure / own * square)
+    of_size = np.divide(lost, square, out=np.zeros_like(square), where=square > 0.0)
+    whitening = np.eye(2) - of_size[:, None, None] * along[:, :, None] * along[:, None]
+    return whitening @ rows, np.einsum("gij,gj->gi", whitening, found.response)
+
+
+def _mean_square(regressors: FloatArray, response: FloatArray) -> float:
+    """Of what the slopes of grasps differ by, were they those of one law; 0 where none is left."""
+    rows, told = regressors.reshape(-1, 2), response.ravel()
+    alike, _, rank, _ = np.linalg.lstsq(rows, told, rcond=CLUSTERS.alone)
     degrees = np.count_nonzero(rows.any(axis=1)) - rank
-    return float(np.square(response - rows @ alike).sum()) / degrees if degrees > 0 else 0.0
+    return float(np.square(told - rows @ alike).sum()) / degrees if degrees > 0 else 0.0
 
 
-def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> FloatArray:
-    """By which the level of each grasp is off the law; 1 where the law is hardly more than what grasps scatter by.
+def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """By which the level of each grasp is off the law, and the variance of that by how its places differ; 1 and 0 where
+    the law is hardly more than what grasps scatter by.
 
     A quotient there tells of scatter, not of a factor, and has any size and sign. Where the law is above twice the
     scatter (``above_scatter``), levels off by two of its deviations have factors from 0 to 2. Grasps that differ by
@@ -82,6 +101,20 @@ def _factors(grasps: Sequence[GraspStatistics], law: FloatArray) -> FloatArray:
     means = np.stack([np.average(grasp.mean, axis=0, weights=grasp.weight * grasp.count) for grasp in grasps])
     expected, friction = law[0] + means[:, :2] @ law[1:], means[:, 2]
     scatter = np.sqrt(np.square(friction - expected).mean())
-    factors = np.ones(len(means))
-    np.divide(friction, expected, out=factors, where=np.abs(expected) > CLUSTERS.above_scatter * scatter)
-    return factors
+    above = np.abs(expected) > CLUSTERS.above_scatter * scatter
+    factors, unsure = np.ones(len(means)), np.zeros(len(means))
+    np.divide(friction, expected, out=factors, where=above)
+    levels = np.array([_variance_of_level(grasp, law) for grasp in grasps])
+    np.divide(levels, np.square(expected), out=unsure, where=above)
+    return factors, unsure
+
+
+def _variance_of_level(grasp: GraspStatistics, law: FloatArray) -> float:
+    """Of the mean that a grasp's places have about the law; 0 of one place, which does not show it."""
+    across = np.array([-law[1], -law[2], 1.0])
+    places, level = float(grasp.count.sum()), grasp.mean @ across
+    if places <= 1.0:
+        return 0.0
+    about = level - np.average(level, weights=grasp.count)
+    square = float(grasp.count @ np.square(about) + np.square(grasp.spread @ across).sum())
+    return square / (places - 1.0) / float(grasp.independent.sum())

@@ -80,6 +80,18 @@ def test_slopes_that_are_alike_whatever_the_level_of_their_grasp_do_not_differ()
     assert divided_by(apart) == pytest.approx(divided_by(grasps), rel=0.01)
 
 
+def test_slopes_that_go_with_their_grasp_do_not_differ_where_its_few_places_hide_its_level() -> None:
+    """Grasps off by 10 %, slopes and all, whose level three places that scatter by 0.05 show to 6 %."""
+    rng = np.random.default_rng(0)
+    grasps = statistics([grasp(rng, 3, 0.0, 0.1, error=1e-3) for _ in range(12)])
+    hidden = [replace(each, mean=each.mean + rng.normal(0.0, 0.05, (3, 1)) * [0.0, 0.0, 1.0]) for each in grasps]
+    assert divided_by(hidden) < 1.6  # 17, were the levels of places taken for their grasp's
+    unsure = _factors(grasps, LAW)[1]
+    assert unsure == pytest.approx(0.0, abs=1e-7)  # of samples alone: 1e-3 of 1,200
+    deviation = np.sqrt(_factors(hidden, LAW)[1])
+    assert np.median(deviation) == pytest.approx(0.05 / np.sqrt(3.0) / 0.458, rel=0.4)  # of three each
+
+
 def test_one_grasp_and_grasps_without_error_are_left_as_they_are() -> None:
     rng = np.random.default_rng(0)
     for grasps in ([grasp(rng, 3)], [grasp(rng, 3, scatter=0.0, error=0.0) for _ in range(3)]):
@@ -113,10 +125,11 @@ def test_a_law_that_falls_to_what_grasps_scatter_by_has_no_factors() -> None:
         replace(each, mean=np.tile([2e-3, force, law @ [1.0, 2e-3, force] + sign * scatter], (3, 1)))
         for each, force, sign in zip(one, forces, np.resize([-1.0, 1.0], 12), strict=True)
     ]
-    factors = _factors(made, law)
+    factors, unsure = _factors(made, law)
     assert (factors > 0.4).all()
     assert (factors < 1.6).all()
     assert factors[-1] == 1.0
+    assert (unsure == 0.0).all()  # places of each are alike
     np.testing.assert_allclose(
         factors[:3],
         [1.0 - scatter / 0.45, 1.0 + scatter / (0.45 - 0.05 * 9 / 11), 1.0 - scatter / (0.45 - 0.05 * 18 / 11)],
