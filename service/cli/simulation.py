@@ -54,8 +54,8 @@ def simulate(
     if explain and not (output is None and picture is None):
         raise typer.BadParameter("--explain makes no log; allowed: --output and --picture without it")
     if output is not None:
-        _check_output(output)
         refuse_inputs(output, Path(scene))
+        _check_output(output)
     if explain:
         _explain(wanted, seed, json, all_runs=yes)
         return

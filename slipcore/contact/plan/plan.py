@@ -123,11 +123,7 @@ class Plan:
         )
 
     def check(self) -> Self:
-        """Itself, after refusing a load or motion that begins once all is over, and a direction that both drive."""
-        for history in self.histories:
-            if history.time[0] >= self.duration and len(set(history.value)) > 1:
-                end = f"before the end of the scene at {self.duration:g} s, which its duration says"
-                raise InvalidInput(f"start of {history.channel}", f"{history.time[0]:g} s", end)
+        """Itself, after refusing a direction in which both load and motion are driven."""
         for load, motion in zip(LOADS, MOTIONS, strict=True):
             if self.drives(load) and self.drives(motion):
                 raise InvalidInput(f"{load} and {motion}", "both driven", "one of them: a load or a motion")

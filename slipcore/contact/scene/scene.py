@@ -32,8 +32,8 @@ class Scene(SceneDescription):
             path = LIBRARY / f"{path}.toml"
         if not path.is_file():
             near = get_close_matches(asked.name, library())
-            known = f"such as {' or '.join(near)} (did you mean that?)" if near else f"one of {', '.join(library())}"
-            raise InvalidInput("scene", asked, f"a TOML file, or a scene of the library, {known}")
+            known = f"the library, such as {' or '.join(near)} (did you mean that?)" if near else ", ".join(library())
+            raise InvalidInput("scene", asked, f"a TOML file, or one of {known}")
         try:
             entries = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -36,7 +36,7 @@ def check_request(accuracy: float | None = None, seconds: float | None = None, t
         check_range("seconds", seconds, above=0.0, unit="s")
     names = [*(each.NAME for each in TIERS), BOUNDARY_ELEMENTS]
     if tier is not None and tier not in names:
-        raise InvalidInput("tier", shown(tier), ", ".join(names))
+        raise InvalidInput("tier", tier if isinstance(tier, str) else shown(tier), ", ".join(names))
 
 
 def cheapest(scene: SceneDescription, plan: Plan, accuracy: float) -> Tier | None:
