@@ -31,7 +31,8 @@ def with_slopes_that_differ(grasps: Sequence[GraspStatistics], law: FloatArray) 
     law's. Were all slopes alike, or alike but for the factor by which the level of their grasp is off the ``law`` [3]
     of (1, v, f_n), the mean square of what they differ by would be that of the samples (analysis of covariance). The
     ratio of the two, of what is nearer, divides what the samples say where it is above 1 (overdispersion; McCullagh &
-    Nelder, 1989, §4.5): a level may be off by its few places, with which slopes do not go.
+    Nelder, 1989, §4.5): a level may be off by its few places, with which slopes do not go. What places leave open of a
+    factor counts as noise (``_beside_levels``).
     """
     within = np.stack([grasp.within for grasp in grasps])
     found = _slopes(within)

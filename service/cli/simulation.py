@@ -52,7 +52,9 @@ def simulate(
 
     wanted = Scene.from_toml(scene)
     if explain and not (output is None and picture is None):
-        raise typer.BadParameter("--explain makes no log; allowed: --output and --picture without it")
+        typer.echo(
+            "--explain makes no log: --output and --picture are left out, and refused by the next version", err=True
+        )
     if output is not None:
         refuse_inputs(output, Path(scene))
         _check_output(output)
@@ -76,11 +78,13 @@ def simulate(
 
 
 def _check_output(path: Path) -> None:
-    """Raises ``InvalidInput`` for what cannot become the NPZ, before anything is simulated."""
+    """Raises ``InvalidInput`` for a folder, before anything is simulated, and warns of a name that tells of no NPZ."""
     from slipcore import InvalidInput
 
-    if path.suffix.lower() != ".npz" or path.is_dir():
-        raise InvalidInput("output", f"{path}, a folder" if path.is_dir() else path, "a file that ends in .npz")
+    if path.is_dir():
+        raise InvalidInput("output", f"{path}, a folder", "a file that ends in .npz")
+    if path.suffix.lower() != ".npz":
+        typer.echo(f"{path} becomes an NPZ all the same; the next version refuses names without .npz", err=True)
 
 
 def _simulated(scene: "Scene", asked: "RequestedAccuracy", seed: int) -> "tuple[GraspLog, bool]":

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from service.cli import main, simulation
+from service.cli.exit_codes import INPUT_REFUSED
 from service.jobs.campaign import Outcome
 from slipcore import FrictionLaw, GraspLog
 from slipcore.frames import GroundTruth
@@ -92,20 +93,37 @@ def test_a_campaign_that_cannot_be_asked_for_leaves_its_folder_free(
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize("name", ["log.txt", "folder.npz"])
-def test_what_cannot_become_a_log_is_refused_before_it_is_simulated(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+def test_a_folder_is_refused_as_a_log_before_it_is_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(simulation, "_simulated", lambda *_: pytest.fail("simulated"))
-    (tmp_path / "folder.npz").mkdir()
-    with pytest.raises(SystemExit):
-        main(["simulate", "table1_condition1", "--output", str(tmp_path / name)])
-    assert "allowed: a file that ends in .npz" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as left:
+        main(["simulate", "table1_condition1", "--output", str(tmp_path)])
+    assert left.value.code == INPUT_REFUSED
+    assert f"{tmp_path}, a folder; allowed: a file that ends in .npz" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_of_another_name_is_written_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulation, "_simulated", lambda *_: (simulated(), False))
+    with pytest.raises(SystemExit) as left:
+        main(["simulate", "table1_condition1", "--output", str(tmp_path / "log.txt")])
+    assert left.value.code == 0
+    assert "log.txt becomes an NPZ all the same; the next version refuses" in capsys.readouterr().err
+    with np.load(tmp_path / "log.txt") as written:
+        np.testing.assert_array_equal(written["time"], simulated().time)
 
 
 @pytest.mark.parametrize("written", ["--output=a.npz", "--picture=a.png"])
-def test_an_explanation_writes_no_log(capsys: pytest.CaptureFixture[str], written: str) -> None:
+def test_an_explanation_writes_no_log_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, written: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulation, "_explain", lambda *_, **__: None)
     with pytest.raises(SystemExit) as left:
         main(["simulate", "table1_condition1", "--explain", written])
-    assert left.value.code == 2
-    assert "--explain makes no log" in capsys.readouterr().err
+    assert left.value.code == 0
+    assert "--explain makes no log: --output and --picture are left out" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
