@@ -99,9 +99,17 @@ def _print_run(ran: "list[PredictionRun]", count: int) -> None:
         for method in methods
     ]
     print_table("Predictions", ("method", "scenes", "seconds"), rows)
-    reasons = dict.fromkeys(f"{each.method}: {each.refused}" for each in ran if each.refused)
-    for reason in list(reasons)[:MOST_NAMED]:
-        typer.echo(printable(reason))
+    scenes: dict[tuple[str, str], list[str]] = {}
+    for each in sorted(ran, key=lambda each: each.scene):
+        if each.refused:
+            scenes.setdefault((each.method, each.refused), []).append(each.scene)
+    for (method, refused), names in list(scenes.items())[:MOST_NAMED]:
+        typer.echo(printable(f"{method}, {_named(names)}: {refused}"))
+
+
+def _named(scenes: list[str]) -> str:
+    """The first of some scenes, and how many there are besides."""
+    return f"scene {scenes[0]}" + (f" and {len(scenes) - 1} more" if len(scenes) > 1 else "")
 
 
 @app.command()

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from service import __version__, formats
 from service.slip_benchmark import folder as files
-from service.slip_benchmark.folder import input_path, prediction_path
+from service.slip_benchmark.folder import SceneEntry, input_path, prediction_path, read_prediction
 from service.whole_files import write_whole
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput, SlipcoreError
@@ -35,7 +35,7 @@ MOST_OUTPUT = 300
 
 @dataclass(frozen=True, slots=True)
 class PredictionRun:
-    """One method on one scene: ``seconds`` that it took, and why there is no prediction (``refused``)."""
+    """One method on one scene: ``seconds`` that it took, and why there is no prediction that can be scored (``refused``)."""
 
     method: str
     scene: str
@@ -100,7 +100,7 @@ def run(executor: Executor, folder: Path, detectors: Sequence[str], program: Pro
             raise InvalidInput("detector", name, ", ".join(METHOD_NAMES))
     if program is not None:
         program.check()
-    scenes = [scene.name for scene in files.read_whole_benchmark(folder).scenes]
+    scenes = files.read_whole_benchmark(folder).scenes
     methods: list[str | Program] = [*dict.fromkeys(detectors), *([] if program is None else [program])]
     for method in methods:
         shutil.rmtree(folder / files.RESULTS / _name(method), ignore_errors=True)
@@ -117,20 +117,21 @@ def _name(method: str | Program) -> str:
     return method if isinstance(method, str) else method.name
 
 
-def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[PredictionRun]:
-    """What each method says of a scene, written; what one refuses is reported."""
+def predict(folder: Path, scene: SceneEntry, methods: Sequence[str | Program]) -> list[PredictionRun]:
+    """What each method says of a scene, written; what one refuses is reported, and what cannot be scored."""
     ran = []
     for method in methods:
         began, refused = perf_counter(), None
-        seen, prediction = input_path(folder, scene), prediction_path(folder, _name(method), scene)
+        seen, prediction = input_path(folder, scene.name), prediction_path(folder, _name(method), scene.name)
         try:
             if isinstance(method, str):
                 _detect(method, seen, prediction)
             else:
                 method.predict(seen, prediction)
+                read_prediction(prediction, (scene.frames, *scene.elements))
         except (SlipcoreError, OSError) as error:
             refused = str(error)
-        ran.append(PredictionRun(_name(method), scene, perf_counter() - began, refused))
+        ran.append(PredictionRun(_name(method), scene.name, perf_counter() - began, refused))
     return ran
 
 

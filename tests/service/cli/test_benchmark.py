@@ -20,9 +20,9 @@ def test_predictions_are_counted_by_method_in_the_order_in_which_they_ran(capsys
     assert (title, first.split(), second.split()) == (
         "Predictions", ["mine", "1", "of", "3", "5.2"], ["filter", "1", "of", "3", "0.5"]
     )  # fmt: skip
-    assert reasons == ["mine: no�[2J"]
+    assert reasons == ["mine, scene 0001 and 1 more: no�[2J"]
 
 
 def test_the_first_twenty_reasons_are_named(capsys: Capture) -> None:
     benchmark._print_run([PredictionRun("mine", f"{k:04d}", 0.0, f"reason {k}") for k in range(25)], 25)
-    assert capsys.readouterr().out.splitlines()[4:] == [f"mine: reason {k}" for k in range(20)]
+    assert capsys.readouterr().out.splitlines()[4:] == [f"mine, scene {k:04d}: reason {k}" for k in range(20)]

@@ -256,6 +256,31 @@ def test_a_prediction_of_the_wrong_shape_is_named(arrays: dict[str, Any], messag
         files.read_prediction(tmp_path / "said.npz", (7, 3, 3))
 
 
+@pytest.mark.parametrize(
+    ("members", "told"),
+    [
+        ("slip=slip[1:]", r"slip is bool of shape"),
+        ("slip=slip.astype(float)", "slip is float64 of shape"),
+        ("slip=slip, probability=slip + 2.0", "probability is 2 to 2; allowed: 0 to 1"),
+        ("probability=slip + 0.0", "members is without slip"),
+    ],
+)
+def test_what_a_program_wrote_is_read_as_it_will_be_scored(
+    members: str, told: str, mine: Path, tmp_path: Path
+) -> None:
+    script = tmp_path / "detector.py"
+    script.write_text(
+        "import sys, numpy as np\nslip = np.zeros(np.load(sys.argv[1])['displacement'].shape[:3], bool)\n"
+        f"np.savez(sys.argv[2], {members})\n",
+        encoding="utf-8",
+    )
+    ran = list(run(Here(), mine, [], Program("mine", f"{sys.executable} {script}", 30.0)))
+    assert all(told in str(each.refused) for each in ran)
+    refused = json.loads((mine / "results/mine/run.json").read_text(encoding="utf-8"))["refused"]
+    assert list(refused) == ["0000", "0001"]
+    assert len(score(mine).wrong) == 2  # the files stay, to be looked at
+
+
 @pytest.mark.parametrize("bound", [0.0, 1.0])
 def test_a_probability_may_be_as_small_and_as_large_as_they_come(bound: float, tmp_path: Path) -> None:
     arrays = {"slip": np.zeros((7, 3, 3), bool), "probability": np.full((7, 3, 3), bound)}
@@ -356,7 +381,7 @@ def test_a_program_predicts_or_its_failure_is_told(mine: Path, tmp_path: Path) -
             ("slow", "sh -c 'sleep 30'"),
         )
     )
-    assert [each.refused for each in copied] == [None, None]
+    assert all("members is with the unknown" in str(each.refused) for each in copied)
     assert "fails is ended by code 3; it said: broken" in str(failed[0].refused)
     assert "without a prediction" in str(silent[0].refused)
     assert "not done after 0.1 s" in str(slow[0].refused)
@@ -474,6 +499,11 @@ def test_what_cannot_be_scored_ends_the_command_with_what_is_wrong(
     assert "prediction of short for scene 0001: slip is bool of shape" in err
     code, _, err = command("run", mine, "--external", "false", "--name", "mine", "--json")
     assert code == INPUT_REFUSED
+    (script := mine / "junk.sh").write_text('echo junk > "$2"\n', encoding="utf-8")
+    code, out, _ = command("run", mine, "--external", f"sh {script}", "--name", "mine")
+    assert code == INPUT_REFUSED
+    assert "0 of 2" in out
+    assert "mine, scene 0000" in out
     code, _, err = command("score", mine / "nowhere")
     assert code == INPUT_REFUSED
     assert "stiction benchmark make" in err
