@@ -43,6 +43,9 @@ def accuracy(
     json: Json = False,
 ) -> None:
     """Draw what accuracy costs in seconds, and say what to ask for: simulating a scene, detecting slip, fitting."""
+    from slipcore.contact.tiers.choice import check_request
+
+    check_request(seconds=seconds)
     paths = [Path(each) for each in what]
     if picture is not None:
         for path in paths:

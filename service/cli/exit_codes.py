@@ -41,6 +41,8 @@ def message(error: Exception) -> str:
 
     if isinstance(error, ValidationError):
         text = complaints(error)
+    elif isinstance(error, MemoryError):
+        text = f"not enough memory for what was asked ({str(error) or 'no more is free'})"
     else:
         text = _by_option(error, _of_system(error) if isinstance(error, OSError) else str(error))
     return "\n".join([text, *getattr(error, "__notes__", ())])
@@ -80,5 +82,6 @@ def exit_code(error: Exception) -> int | None:
         (EstimatorError, INPUT_REFUSED),
         (SlipcoreError, INPUT_REFUSED),
         (OSError, INPUT_REFUSED),
+        (MemoryError, FAILURE),
     ]
     return next((code for kind, code in codes if isinstance(error, kind)), None)

@@ -51,10 +51,8 @@ def simulate(
     from slipcore.contact import Scene
 
     wanted = Scene.from_toml(scene)
-    if explain and not (output is None and picture is None):
-        typer.echo(
-            "--explain makes no log: --output and --picture are left out, and refused by the next version", err=True
-        )
+    if explain:
+        _tell_left_out(output=output, picture=picture, accuracy=accuracy, seconds=seconds, tier=tier)
     if output is not None:
         refuse_inputs(output, Path(scene))
         _check_output(output)
@@ -75,6 +73,14 @@ def simulate(
     _print(log, wanted.name, json)
     if ended:
         raise typer.Exit(INTERRUPTED)
+
+
+def _tell_left_out(**options: object) -> None:
+    """Warn of options that an explanation leaves out."""
+    given = [f"--{name}" for name, value in options.items() if value is not None]
+    if given:
+        left = "is left out, and refused" if len(given) == 1 else "are left out, and refused"
+        typer.echo(f"--explain makes coarse runs and no log: {', '.join(given)} {left} by the next version", err=True)
 
 
 def _check_output(path: Path) -> None:

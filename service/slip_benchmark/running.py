@@ -35,7 +35,9 @@ MOST_OUTPUT = 300
 
 @dataclass(frozen=True, slots=True)
 class PredictionRun:
-    """One method on one scene: ``seconds`` that it took, and why there is no prediction that can be scored (``refused``)."""
+    """One method on one scene: ``seconds`` that it took, and why it has no prediction that can be scored
+    (``refused``).
+    """
 
     method: str
     scene: str

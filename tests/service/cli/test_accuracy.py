@@ -9,6 +9,7 @@ from unittest.mock import Mock
 import pytest
 
 from service.cli import accuracy, main
+from service.cli.exit_codes import INPUT_REFUSED
 from service.report.work_precision import Setting, WorkPrecision
 from tests.service.report.test_material import MODEL
 
@@ -45,6 +46,17 @@ def test_the_models_of_a_material_are_asked_for_in_the_order_of_their_names(monk
     found = accuracy._of_material("paper", "http://there", None)
     assert [call.args for call in client.model.call_args_list] == [("paper", "hierarchical"), ("paper", "ols")]
     assert found.subject == "paper"
+
+
+@pytest.mark.parametrize("seconds", ["-1", "0", "nan", "inf"])
+def test_a_time_that_means_nothing_is_refused_before_anything_is_run(
+    seconds: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(accuracy, "_of_scene", lambda *_: pytest.fail("ran"))
+    with pytest.raises(SystemExit) as left:
+        main(["accuracy", "table1_condition1", "--seconds", seconds])
+    assert left.value.code == INPUT_REFUSED
+    assert f"seconds is {seconds} s; allowed: above 0 s" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("text", "is_scene"), [("a.toml", True), ("lifting_15N", True), ("a.npz", False)])

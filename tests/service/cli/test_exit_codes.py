@@ -52,6 +52,7 @@ def test_codes_differ_and_none_says_that_all_is_well() -> None:
         (InvalidInput("time", -1.0, "0 or more"), INPUT_REFUSED),
         (NoForces("none"), INPUT_REFUSED),
         (FileNotFoundError("log.npz"), INPUT_REFUSED),
+        (MemoryError("Unable to allocate 3.64 TiB"), FAILURE),
         (ZeroDivisionError(), None),
         (ValueError("ours"), None),
         (KeyError("ours"), None),
@@ -119,3 +120,9 @@ def test_the_first_argument_that_is_no_text_is_named(arguments: list[str], garbl
 )
 def test_what_a_system_says_of_a_file_is_said_of_the_one_that_a_user_knows(error: OSError, said: str) -> None:
     assert message(error) == said
+
+
+def test_memory_that_is_not_there_is_named_without_a_traceback() -> None:
+    told = message(MemoryError("Unable to allocate 3.64 TiB"))
+    assert told == "not enough memory for what was asked (Unable to allocate 3.64 TiB)"
+    assert message(MemoryError()) == "not enough memory for what was asked (no more is free)"

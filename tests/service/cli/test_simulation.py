@@ -116,14 +116,24 @@ def test_a_log_of_another_name_is_written_with_a_warning(
         np.testing.assert_array_equal(written["time"], simulated().time)
 
 
-@pytest.mark.parametrize("written", ["--output=a.npz", "--picture=a.png"])
-def test_an_explanation_writes_no_log_and_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, written: str
-) -> None:
+@pytest.mark.parametrize(
+    ("options", "left_out"),
+    [
+        (["--output=a.npz", "--picture=a.png"], "--output, --picture are left out, and refused by the next version"),
+        (["--accuracy=0.1", "--seconds=3"], "--accuracy, --seconds are left out"),
+        (["--tier=beams"], "--tier is left out, and refused by the next version"),
+        ([], ""),
+    ],
+)
+def test_an_explanation_makes_coarse_runs_and_says_what_it_leaves_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    options: list[str], left_out: str,
+) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulation, "_explain", lambda *_, **__: None)
     with pytest.raises(SystemExit) as left:
-        main(["simulate", "table1_condition1", "--explain", written])
+        main(["simulate", "table1_condition1", "--explain", *options])
     assert left.value.code == 0
-    assert "--explain makes no log: --output and --picture are left out" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert f"--explain makes coarse runs and no log: {left_out}" in err if left_out else err == ""
     assert list(tmp_path.iterdir()) == []

@@ -265,9 +265,7 @@ def test_a_prediction_of_the_wrong_shape_is_named(arrays: dict[str, Any], messag
         ("probability=slip + 0.0", "members is without slip"),
     ],
 )
-def test_what_a_program_wrote_is_read_as_it_will_be_scored(
-    members: str, told: str, mine: Path, tmp_path: Path
-) -> None:
+def test_what_a_program_wrote_is_read_as_it_will_be_scored(members: str, told: str, mine: Path, tmp_path: Path) -> None:
     script = tmp_path / "detector.py"
     script.write_text(
         "import sys, numpy as np\nslip = np.zeros(np.load(sys.argv[1])['displacement'].shape[:3], bool)\n"
