@@ -1,10 +1,12 @@
 """An object that is moved, whatever force that takes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
-from slipcore.contact.effects.load_path import repeated
-from slipcore.contact.plan.plan import Channel, History, Plan
+from slipcore.contact.effects.load_path import check_path, with_paths
+from slipcore.contact.plan.plan import MOTIONS, Plan
+
+COORDINATES = ("x", "y", "yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +26,14 @@ class ObjectMotion:
     why: ClassVar[str] = "a stage or a robot moves the object; the contact may slide as a whole"
     cost: ClassVar[str] = "less than a load: no balance to meet"
 
+    def __post_init__(self) -> None:
+        check_path(self, COORDINATES)
+
     @property
     def absent(self) -> bool:
         """Whether nothing is held; an object held still is not."""
-        return not (self.x or self.y or self.yaw)
+        return not any(len(getattr(self, name)) for name in COORDINATES)
 
     def extend(self, plan: Plan) -> Plan:
         """Add a history of each coordinate that is held."""
-        channels: tuple[Channel, ...] = ("motion_x", "motion_y", "yaw")
-        added = [
-            History(channel, *repeated(self.time, path, self.cycles))
-            for channel, path in zip(channels, (self.x, self.y, self.yaw), strict=True)
-            if path
-        ]
-        return replace(plan, histories=(*plan.histories, *added))
+        return with_paths(plan, self, MOTIONS, COORDINATES)

@@ -8,7 +8,7 @@ import numpy as np
 from slipcore.arguments import of_kind, shown
 from slipcore.contact.defaults import RAMP, SCENE
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.plan.entries import check_finite, check_own_types
+from slipcore.contact.plan.entries import check_finite, check_own_types, check_seed
 from slipcore.contact.plan.plan import Effect, Plan, ramp
 from slipcore.contact.solver.problem import ContactProblem, HeightField
 from slipcore.errors import InvalidInput
@@ -82,6 +82,8 @@ class SceneDescription:
 
     def __post_init__(self) -> None:
         check_own_types(self)
+        if not self.name.strip():
+            raise InvalidInput("name of the scene", shown(self.name), "one that is not blank")
         of_kind("finger", self.finger, Finger)
         of_kind("press", self.press, Press)
         if not 0.0 < self.duration < np.inf:
@@ -90,7 +92,11 @@ class SceneDescription:
         self.plan()
 
     def plan(self, seed: int = 0) -> Plan:
-        """The scene with all its effects added, in an order that does not depend on how they are listed."""
+        """The scene with all its effects added, in an order that does not depend on how they are listed.
+
+        Raises ``InvalidInput``, for a ``seed`` that is no whole number of at least 0 as well.
+        """
+        check_seed(seed)
         finger = self.finger
         body = HalfSpace.from_young(finger.young_modulus, finger.poisson_ratio)
         plan = Plan(

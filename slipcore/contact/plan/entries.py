@@ -42,12 +42,22 @@ def check_finite(record: Any) -> None:
                 raise InvalidInput(f"{entry.name} of {type(record).__name__}", arguments.shown(value), allowed)
 
 
+def check_seed(seed: object) -> None:
+    """Raises ``InvalidInput`` for a seed that is no whole number, or below 0."""
+    if not _is_whole(seed) or seed < 0:  # type: ignore[operator]
+        raise InvalidInput("seed", arguments.shown(seed), "a whole number, 0 or more")
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
 def _check(name: str, kind: Any, value: Any) -> None:
     """One value against a type; types other than those of numbers, texts and tuples of numbers are not looked at."""
     if kind is float:
         arguments.number(name, value)
     elif kind is int:
-        if not isinstance(value, Integral) or isinstance(value, bool):
+        if not _is_whole(value):
             raise InvalidInput(name, arguments.shown(value), "a whole number")
     elif kind is str:
         arguments.of_kind(name, value, str)
@@ -58,8 +68,7 @@ def _check(name: str, kind: Any, value: Any) -> None:
 def _check_row(name: str, parts: tuple[Any, ...], value: Any) -> None:
     """A tuple, list or array of as many values as ``parts`` says, or of any number where they end in an ellipsis."""
     if get_origin(parts[0]) is tuple:  # a map: too many values to look at one by one
-        if arguments.real_array(name, value).ndim != 2:
-            raise InvalidInput(name, arguments.shown(value), "rows of numbers, all of one length")
+        _check_map(name, value)
         return
     count = None if parts[-1] is Ellipsis else len(parts)
     allowed = f"{count or 'a list of'} {'whole ' if parts[0] is int else ''}numbers"
@@ -68,6 +77,17 @@ def _check_row(name: str, parts: tuple[Any, ...], value: Any) -> None:
         raise InvalidInput(name, arguments.shown(value), allowed)
     for each in value:
         _check(f"each of {name}", parts[0], each)
+
+
+def _check_map(name: str, value: Any) -> None:
+    """Rows of numbers, all of one length."""
+    allowed = "rows of numbers, all of one length"
+    lengths = [np.size(row) for row in value] if isinstance(value, tuple | list) else []
+    for row, length in enumerate(lengths):
+        if length != lengths[0]:
+            raise InvalidInput(name, f"{length} long in row {row} and {lengths[0]} in row 0", allowed)
+    if arguments.real_array(name, value).ndim != 2:
+        raise InvalidInput(name, arguments.shown(value), allowed)
 
 
 def _holds_numbers(kind: Any) -> bool:

@@ -107,6 +107,19 @@ class Plan:
         times = np.unique([t for history in self.histories for t in history.time])
         return np.asarray(times[(times > 0.0) & (times < self.duration)])
 
+    def cut_short(self) -> str:
+        """Which loads and motions go on beyond the scene's end, where they are then, and what they would come to; empty
+        where none does.
+        """
+        parts = []
+        for channel in dict.fromkeys(history.channel for history in self.histories):
+            own = [history for history in self.histories if history.channel == channel]
+            late = sorted({time for history in own for time in history.time if time > self.duration})
+            now, *later = [self.value(channel, time) for time in (self.duration, *late)]
+            if any(value != now for value in later):
+                parts.append(f"{channel} at {now:.3g} on its way to {later[-1]:.3g}")
+        return f"after {self.duration:g} s: {', '.join(parts)}" if parts else ""
+
     def largest_force(self) -> float:
         """Largest normal force N."""
         return max(self.value("normal_force", float(time)) for time in (*self.corners(), self.duration))

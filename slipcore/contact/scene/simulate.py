@@ -34,7 +34,8 @@ def simulate(
 
     ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
-    metadata give tier, grid, steps, tolerance, estimated accuracy and seconds. ``progress`` is given the part done.
+    metadata give tier, grid, steps, tolerance, estimated accuracy and seconds, and which loads the scene's end has cut
+    short. ``progress`` is given the part done.
 
     Raises ``InfeasibleLoad`` where friction cannot carry a load, ``OutOfReach`` for an accuracy or seconds that cannot
     be kept, with what can, ``NotConverged`` and ``InvalidInput``; ``Interrupted``, with the best log until then, where
@@ -60,13 +61,20 @@ def simulate(
             return _requested(scene, plan, simulate_to(plan, accuracy, seconds, progress))
         except Stopped as stopped:
             raise Interrupted(_requested(scene, plan, stopped.found, {"stopped": "interrupted"})) from stopped
-    return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata, "estimated accuracy": estimated}))
+    return observe(plan, _described(scene, plan, log, {"estimated accuracy": estimated}))
 
 
 def _requested(scene: SceneDescription, plan: Plan, found: Refined, more: Mapping[str, str] | None = None) -> GraspLog:
     """The log of a request as the sensor sees it, with what it has come to."""
     about = {"seconds": f"{found.seconds:.3f}", "estimated accuracy": f"{found.error.largest:.2g}", **(more or {})}
-    return observe(plan, replace(found.log, metadata={"scene": scene.name, **found.log.metadata, **about}))
+    return observe(plan, _described(scene, plan, found.log, about))
+
+
+def _described(scene: SceneDescription, plan: Plan, log: GraspLog, about: Mapping[str, str]) -> GraspLog:
+    """The log with the scene's name, what its end cut short, and more in its metadata."""
+    cut = plan.cut_short()
+    short = {"cut short": cut} if cut else {}
+    return replace(log, metadata={"scene": scene.name, **log.metadata, **about, **short})
 
 
 def observe(plan: Plan, log: GraspLog) -> GraspLog:

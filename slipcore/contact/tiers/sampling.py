@@ -10,6 +10,7 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.free_grid import FreeSensorGrid
+from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
 
 
@@ -79,10 +80,13 @@ def sensor_grid(sampling: SamplingPlan | None, reach: float, cells_across: int) 
 
 
 def frame_times(plan: Plan) -> FloatArray:
-    """Times of the frames, from zero to the end of the scene."""
+    """Times of the frames, from zero to the end of the scene; raises ``InvalidInput`` where that is one alone."""
     rate = ACCURACY.frames / plan.duration if plan.sampling is None else plan.sampling.frame_rate
     # A whole number of frames stays one in spite of rounding.
     last = np.floor(plan.duration * rate * (1.0 + CHEAP_TIERS.rounding))
+    if last < 1.0:
+        allowed = f"{1.0 / plan.duration:.3g} 1/s or more, for two frames in the scene's {plan.duration:g} s"
+        raise InvalidInput("frame_rate of SensorSampling", f"{rate:g} 1/s", allowed)
     return np.asarray(np.arange(last + 1.0) / rate)
 
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf, nan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from slipcore.contact.effects import (
     DroppedFrames,
     FrictionPatch,
     LoadPath,
+    ObjectMotion,
     PressureFriction,
     RandomFriction,
     SensorSampling,
@@ -170,12 +172,43 @@ def test_frames_are_lost_of_a_log_whose_truth_nobody_knows() -> None:
         (lambda: RandomFriction(0.1, -1e-3), "correlation_length is -0.001; allowed: above 0 m"),
         (lambda: SensorSampling((5, 1)), "points of the sensor is (5, 1); allowed: at least 2 each way"),
         (lambda: SensorSampling(pitch=0.0), "pitch above 0 m and frame rate above 0 1/s"),
+        (
+            lambda: LoadPath((0.0, 1.0)),
+            "loads of LoadPath is none; allowed: one or more of normal_force, force_x, force_y, moment",
+        ),
+        (
+            lambda: LoadPath((0.0, 1.0), force_x=(1.0,)),
+            "force_x of LoadPath is 1 values; allowed: one for each time, 2, or none",
+        ),
+        (
+            lambda: LoadPath((0.0, 1.0), force_x=(0.0, 1.0), cycles=0),
+            "cycles of LoadPath is 0; allowed: a whole",
+        ),
+        (
+            lambda: ObjectMotion((0.0,), yaw=(0.0, 1.0)),
+            "yaw of ObjectMotion is 2 values; allowed: one for each",
+        ),
         (lambda: SensorSampling(frame_rate=0.0), "pitch above 0 m and frame rate above 0 1/s"),
     ],
 )
 def test_an_impossible_effect_is_refused_by_name_and_value(make: Callable[[], Effect], message: str) -> None:
     with pytest.raises(InvalidInput, match=re.escape(message)):
         make()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda row: LoadPath(row(0.0, 1.0), normal_force=row(0.0, 3.0), cycles=2),
+        lambda row: ObjectMotion(row(0.0, 1.0), y=row(0.0, 3.0), cycles=2),
+    ],
+)
+def test_a_path_may_be_arrays(make: Callable[[Callable[..., Any]], Effect]) -> None:
+    """They were allowed by their type, and ended in numpy's error."""
+    plan = Scene("a").plan()
+    as_tuples, as_arrays = (make(row) for row in (lambda *values: values, lambda *values: np.array(values)))
+    assert not as_arrays.absent
+    assert as_arrays.extend(plan).histories == as_tuples.extend(plan).histories
 
 
 @pytest.mark.parametrize(

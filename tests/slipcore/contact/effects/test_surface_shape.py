@@ -132,7 +132,10 @@ def test_only_what_adds_no_gap_anywhere_is_absent(effect: Effect, absent: bool) 
         (lambda: WavySurface(1e-6, -1e-3), "wavelength is -0.001; allowed: above 0 m"),
         (lambda: MeasuredSurface(((0.0, 0.0),), 1e-3), "a rectangle of at least 2 × 2"),
         (lambda: MeasuredSurface(((0.0,), (0.0,)), 1e-3), "a rectangle of at least 2 × 2"),
-        (lambda: MeasuredSurface(((0.0, 0.0), (0.0, 0.0, 0.0)), 1e-3), "heights of MeasuredSurface is not an array"),
+        (
+            lambda: MeasuredSurface(((0.0, 0.0), (0.0, 0.0, 0.0)), 1e-3),
+            "heights of MeasuredSurface is 3 long in row 1",
+        ),
         (lambda: MeasuredSurface(((0.0, inf), (0.0, 0.0)), 1e-3), "finite heights, m"),
         (lambda: MeasuredSurface(MAP, 0.0), "pitch of the map is 0.0; allowed: above 0 m"),
     ],

@@ -28,6 +28,13 @@ def test_a_map_is_rows_of_numbers(heights: object) -> None:
         check_types(MeasuredSurface, {"heights": heights})
 
 
+def test_a_ragged_map_is_told_its_first_row_of_another_length() -> None:
+    with pytest.raises(InvalidInput, match="heights of MeasuredSurface is 3 long in row 1 and 2 in row 0"):
+        MeasuredSurface(((0.0, 1.0), (0.0, 1.0, 2.0), (0.0,)), 1e-3)
+    with pytest.raises(InvalidInput, match="1 long in row 1"):
+        check_types(MeasuredSurface, {"heights": [[0.0, 1.0], 3.0]})
+
+
 @pytest.mark.parametrize("wrong", [math.nan, math.inf])
 def test_numbers_of_effects_are_finite(wrong: float) -> None:
     with pytest.raises(InvalidInput, match="change of FrictionPatch"):

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slipcore.contact.effects import EFFECTS, FlatSurface, MarkerNoise, SensorSampling, TangentialLoad
+from slipcore.contact.effects import EFFECTS, FlatSurface, LoadPath, MarkerNoise, SensorSampling, TangentialLoad
 from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.scene import Finger, Press, Scene, simulate
+from slipcore.contact.scene import Finger, Press, Scene, library, simulate
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.contact.tiers.probe import contact_reach
 from slipcore.contact.tiers.sampling import SensorGrid, sensor_grid
@@ -108,6 +108,40 @@ def test_a_misspelt_scene_is_told_the_likely_ones_alone() -> None:
 def test_a_request_that_means_nothing_is_refused_by_name(given: dict, told: str) -> None:
     with pytest.raises(InvalidInput, match=told):
         simulate(**{"scene": Scene("a"), **given})
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, True, "a", None])
+def test_a_seed_is_a_whole_number_of_at_least_0(seed) -> None:
+    scene = Scene("a", (MarkerNoise(1e-6),))
+    for ask in (scene.plan, scene.explain, lambda seed: simulate(scene, seed=seed)):
+        with pytest.raises(InvalidInput, match=f"seed is {seed!r}; allowed: a whole number, 0 or more"):
+            ask(seed)
+    assert scene.plan(np.int64(3)).seed == 3
+
+
+def test_a_scene_has_a_name() -> None:
+    with pytest.raises(InvalidInput, match=r"name of the scene is ' \\n'; allowed: one that is not blank"):
+        Scene(" \n")
+
+
+def test_a_sensor_has_two_frames_in_the_scene() -> None:
+    scene = Scene("a", (SensorSampling((4, 4), 1e-3, 0.4),), press=Press(1.0, 0.5), duration=2.0)
+    with pytest.raises(InvalidInput, match=r"frame_rate of SensorSampling is 0\.4 1/s; allowed: 0\.5 1/s or more"):
+        simulate(scene)
+
+
+def test_a_log_says_which_loads_the_end_of_its_scene_cuts_short() -> None:
+    late = TangentialLoad((1.0, 0.0), start=9.0)
+    fall = LoadPath((0.5, 1.5, 4.0), normal_force=(0.0, 0.0, -2.0))
+    cut = Scene("a", (late, fall), press=Press(5.0, 2.0), duration=1.0)
+    told = "after 1 s: normal_force at 2.5 on its way to 3, force_x at 0 on its way to 1"
+    assert simulate(cut, fidelity=Fidelity(8)).metadata["cut short"] == told
+    whole = Scene("a", (TangentialLoad((1.0, 0.0), 1.0, 0.5),), press=Press(5.0, 1.0), duration=1.5)
+    assert "cut short" not in simulate(whole, fidelity=Fidelity(8)).metadata
+
+
+def test_no_scene_of_the_library_is_cut_short() -> None:
+    assert [name for name in library() if Scene.from_toml(name).plan().cut_short()] == []
 
 
 def test_text_is_no_number_of_an_effect_or_a_fidelity() -> None:
