@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.connection import connected
+from service.cli.exit_codes import INTERRUPTED
 from service.cli.inputs import read_log, refuse_inputs
 from service.cli.options import DEFAULT_URL, FrameRate, Json, Key, Mapping, Picture, Rest, Scale, Url
 from service.cli.output import print_json, print_table
@@ -50,8 +51,10 @@ def accuracy(
     if picture is not None:
         for path in paths:
             refuse_inputs(picture, path)
+    interrupted = False
     if len(paths) == 1 and _is_scene(what[0]):
-        found = [_of_scene(what[0], seconds, seed)]
+        scene, interrupted = _of_scene(what[0], seconds, seed)
+        found = [scene]
     elif all(path.exists() for path in paths):
         logs = [read_log(path, mapping, scale, frame_rate, rest) for path in paths]
         found = _of_logs(paths[0].name, logs)
@@ -61,6 +64,8 @@ def accuracy(
         missing = next(str(path) for path in paths if not path.exists())
         raise typer.BadParameter(f"there is no file {missing}; allowed: a scene, grasp logs, or the name of a material")
     _tell(found, picture, json)
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
 
 
 def _is_scene(text: str) -> bool:
@@ -69,13 +74,17 @@ def _is_scene(text: str) -> bool:
     return text.endswith(".toml") or text in library()
 
 
-def _of_scene(name: str, seconds: float, seed: int) -> "WorkPrecision":
+def _of_scene(name: str, seconds: float, seed: int) -> "tuple[WorkPrecision, bool]":
+    """What a scene costs, and whether Ctrl-C ended it: it is then what was found until then."""
     from service.report import work_precision
     from slipcore.contact import Scene
 
     scene = Scene.from_toml(name)
     with shown_progress(f"simulating {scene.name} ever more finely") as tell:
-        return work_precision.of_scene(scene, seconds, seed, tell)
+        try:
+            return work_precision.of_scene(scene, seconds, seed, tell), False
+        except work_precision.Unfinished as stopped:
+            return stopped.found, True
 
 
 def _of_logs(first: str, logs: "list[GraspLog]") -> "list[WorkPrecision]":

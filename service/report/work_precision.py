@@ -1,7 +1,7 @@
 """Work and precision: what each way to simulate a scene, detect slip in a log or fit friction costs, and misses."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING
@@ -53,6 +53,14 @@ class WorkPrecision:
         return tuple(not any(_beats(other, each) for other in self.settings) for each in self.settings)
 
 
+class Unfinished(KeyboardInterrupt):
+    """Ctrl-C once there is something to tell: ``found`` until then."""
+
+    def __init__(self, found: WorkPrecision) -> None:
+        self.found = found
+        KeyboardInterrupt.__init__(self, "interrupted")
+
+
 def _beats(one: Setting, other: Setting) -> bool:
     """Whether ``one`` errs less for no more time, or takes less for no more error."""
     no_worse = one.seconds <= other.seconds and one.error <= other.error
@@ -60,22 +68,37 @@ def _beats(one: Setting, other: Setting) -> bool:
 
 
 def of_scene(scene: "Scene", seconds: float, seed: int, progress: "Progress") -> WorkPrecision:
-    """The tiers that know a scene, and ever finer grids for as long as the next one fits into about ``seconds``."""
+    """The tiers that know a scene, and ever finer grids for as long as the next one fits into about ``seconds``.
+
+    Raises ``Unfinished``, with the settings until then, where Ctrl-C comes after the first.
+    """
+    measure = "largest of the errors of stick ratio, displacement and force, estimated"
+    found = list[Setting]()
+    try:
+        for setting in _ever_finer(scene, seconds, seed, progress):
+            found.append(setting)
+    except KeyboardInterrupt as stopped:
+        if not found:
+            raise
+        raise Unfinished(WorkPrecision(scene.name, measure, tuple(found))) from stopped
+    return WorkPrecision(scene.name, measure, tuple(found))
+
+
+def _ever_finer(scene: "Scene", seconds: float, seed: int, progress: "Progress") -> Iterator[Setting]:
+    """Each tier that knows a scene, then each grid, as they are run."""
     from slipcore.contact.tiers.accuracy import refinements
     from slipcore.contact.tiers.choice import TIERS
 
-    plan, found = scene.plan(seed), []
+    plan = scene.plan(seed)
     for tier in TIERS:
         known = tier.accuracy(scene, plan)
         if known is not None:
             began = perf_counter()
             tier.run(scene, plan)
-            found.append(Setting(f'--tier "{tier.NAME}"', perf_counter() - began, known, "known of the tier"))
+            yield Setting(f'--tier "{tier.NAME}"', perf_counter() - began, known, "known of the tier")
     for made in refinements(plan, seconds, progress):
         error, grid = made.error.largest, f"{made.fidelity.cells} cells, steps a frame: {made.fidelity.substeps}"
-        found.append(Setting(f"--accuracy {_rounded_up(error):g}", made.seconds, error, grid))
-    measure = "largest of the errors of stick ratio, displacement and force, estimated"
-    return WorkPrecision(scene.name, measure, tuple(found))
+        yield Setting(f"--accuracy {_rounded_up(error):g}", made.seconds, error, grid)
 
 
 def of_detection(log: "GraspLog", name: str, progress: "Progress") -> WorkPrecision:

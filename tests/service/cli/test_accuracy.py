@@ -9,7 +9,8 @@ from unittest.mock import Mock
 import pytest
 
 from service.cli import accuracy, main
-from service.cli.exit_codes import INPUT_REFUSED
+from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED
+from service.report import work_precision
 from service.report.work_precision import Setting, WorkPrecision
 from tests.service.report.test_material import MODEL
 
@@ -57,6 +58,16 @@ def test_a_time_that_means_nothing_is_refused_before_anything_is_run(
         main(["accuracy", "table1_condition1", "--seconds", seconds])
     assert left.value.code == INPUT_REFUSED
     assert f"seconds is {seconds} s; allowed: above 0 s" in capsys.readouterr().err
+
+
+def test_what_was_found_until_ctrl_c_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(work_precision, "of_scene", Mock(side_effect=work_precision.Unfinished(FOUND)))
+    with pytest.raises(SystemExit) as left:
+        main(["accuracy", "table1_condition1"])
+    assert left.value.code == INTERRUPTED
+    assert "beaten" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("text", "is_scene"), [("a.toml", True), ("lifting_15N", True), ("a.npz", False)])

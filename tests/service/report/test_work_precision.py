@@ -1,6 +1,7 @@
 """What is worth asking for, and that errors and seconds are those of the settings."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -48,6 +49,20 @@ def test_a_scene_is_refined_as_long_as_its_seconds_last() -> None:
     assert float(grids[0].ask.split()[1]) >= grids[0].error > 0.0
     with pytest.raises(InvalidInput, match="seconds"):
         work_precision.of_scene(Scene.from_toml("table1_condition1"), 0.0, 0, ignored)
+
+
+@pytest.mark.parametrize("after", [0, 1])
+def test_ctrl_c_keeps_what_was_found_until_then(after: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: object) -> Iterator[Setting]:
+        yield from [Setting("a", 1.0, 0.5)][:after]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(work_precision, "_ever_finer", stopped)
+    with pytest.raises(KeyboardInterrupt) as end:
+        work_precision.of_scene(Scene.from_toml("table1_condition1"), 1.0, 0, ignored)
+    found = getattr(end.value, "found", None)
+    assert (found is None) == (after == 0)
+    assert found is None or [each.ask for each in found.settings] == ["a"]
 
 
 def test_detectors_are_compared_with_truth_or_with_the_default(log: GraspLog) -> None:
