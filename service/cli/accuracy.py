@@ -17,6 +17,7 @@ from service.cli.options import DEFAULT_URL, FrameRate, Json, Key, Mapping, Pict
 from service.cli.output import print_json, print_table
 from service.cli.progress import counted, shown_progress
 from service.formatting import number
+from service.whole_files import check_place
 
 if TYPE_CHECKING:
     from service.report.work_precision import Setting, WorkPrecision
@@ -51,6 +52,7 @@ def accuracy(
     if picture is not None:
         for path in paths:
             refuse_inputs(picture, path)
+        check_place(picture)
     interrupted = False
     if len(paths) == 1 and _is_scene(what[0]):
         scene, interrupted = _of_scene(what[0], seconds, seed)

@@ -9,7 +9,7 @@ import typer
 from service.cli.exit_codes import INPUT_REFUSED
 from service.cli.options import Json
 from service.cli.output import plain, print_json, print_table, printable
-from service.cli.progress import counted, shown_progress
+from service.cli.progress import counted, resumable, shown_progress
 
 if TYPE_CHECKING:
     from service.slip_benchmark.running import PredictionRun
@@ -43,7 +43,7 @@ def make(
     kinds = kinds_named(kind or ())
     with workers(processes or _cores()) as executor:
         entries = make_scenes(executor, phrase, scenes, kinds, output)
-        made = list(counted(entries, scenes_in(output, scenes), "scenes"))
+        made = resumable(entries, scenes_in(output, scenes), "scenes", output)
     if json:
         print_json({"folder": str(output), "scenes": len(made), "kinds": [each.name for each in kinds]})
     else:

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from time import perf_counter
 from traceback import walk_stack
 from types import FrameType
@@ -78,6 +79,18 @@ def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
         for count, thing in enumerate(things, 1):
             tell(count / total, f"{count} of {total} {name}")
             yield thing
+
+
+def resumable(things: Iterable[Thing], total: int, name: str, folder: Path) -> list[Thing]:
+    """All things, ``counted``, each kept in a folder once it is there; Ctrl-C says how to have the others."""
+    made = list[Thing]()
+    try:
+        for thing in counted(things, total, name):
+            made.append(thing)
+    except KeyboardInterrupt:
+        typer.echo(f"{len(made)} of {total} {name} are in {folder}; the same command makes the others", err=True)
+        raise
+    return made
 
 
 @contextmanager

@@ -13,9 +13,9 @@ from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED
 from service.cli.inputs import refuse_inputs
 from service.cli.options import Json, Picture
 from service.cli.output import print_json, print_lines, print_table
-from service.cli.progress import counted, shown_progress
+from service.cli.progress import resumable, shown_progress
 from service.formatting import number
-from service.whole_files import write_whole
+from service.whole_files import check_place, write_whole
 
 if TYPE_CHECKING:
     from service.jobs.campaign import Outcome, RequestedAccuracy
@@ -59,6 +59,9 @@ def simulate(
     if explain:
         _explain(wanted, seed, json, all_runs=yes)
         return
+    for path in (output, picture):
+        if path is not None:
+            check_place(path)
     from service.jobs.campaign import RequestedAccuracy
 
     log, ended = _simulated(wanted, RequestedAccuracy(accuracy, seconds, tier), seed)
@@ -132,7 +135,7 @@ def campaign(
     asked = RequestedAccuracy(accuracy, seconds, tier)
     with workers(processes or os.cpu_count() or 1, dask_address) as executor:
         outcomes = run(executor, wanted, range(seeds), output, asked, written_as)
-        made = list(counted(outcomes, len(wanted) * seeds, "logs"))
+        made = resumable(outcomes, len(wanted) * seeds, "logs", output)
     _print_campaign(made, output, json)
     if any(outcome.refused for outcome in made):
         raise typer.Exit(INPUT_REFUSED)

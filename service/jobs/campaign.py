@@ -7,13 +7,18 @@ folders named as Hive does, ``logs/scene=NAME/seed=0``.
 
 import hashlib
 import json
+import os
 import re
+import sys
+import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from db.errors import DriverMissing
 from service.formats import writing
@@ -29,6 +34,7 @@ PLAN = "campaign.json"
 CONNECT_SECONDS = 10.0
 """s that a Dask scheduler may take to answer."""
 FORMATS = ("npz", "parquet")
+PARQUET_END = b"PAR1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +114,7 @@ def run(
     for scene in scenes:
         for seed in seeds:
             outcome = Outcome(scene.name, seed, folder / _place(scene, seed, written_as))
-            if outcome.path.exists():
+            if _is_whole(outcome.path, written_as):
                 yield outcome
             else:
                 under_way[executor.submit(simulate, scene, seed=seed, **asdict(accuracy))] = outcome
@@ -121,6 +127,17 @@ def _place(scene: Scene, seed: int, written_as: str) -> Path:
     if written_as == "parquet":
         return Path("logs", f"scene={name}", f"seed={seed}", "log.parquet")
     return Path(f"{name}-{seed}.npz")
+
+
+def _is_whole(path: Path, written_as: str) -> bool:
+    """Whether a log is there up to its end, by what its format ends with: a crash of the system may have cut it."""
+    if not path.is_file():
+        return False
+    if written_as == "npz":
+        return zipfile.is_zipfile(path)
+    with path.open("rb") as stream:
+        stream.seek(-min(len(PARQUET_END), path.stat().st_size), os.SEEK_END)
+        return stream.read() == PARQUET_END
 
 
 def _kept(done: Future[GraspLog], outcome: Outcome, written_as: str) -> Outcome:
@@ -155,10 +172,16 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], accuracy: RequestedAccura
             f"campaign in {folder}", _plan_text(asked), f"{_plan_text(known['promise'])}, or another folder"
         )
     for scene in scenes:
-        digest = hashlib.sha256(repr(scene).encode()).hexdigest()
+        digest = _digest(scene)
         if known["scenes"].setdefault(_file_name(scene), digest) != digest:
             raise InvalidInput("scene", f"another {scene.name!r} than that in {folder}", "the same, or another folder")
     write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
+
+
+def _digest(scene: Scene) -> str:
+    """By which a scene is known again; maps and paths that are arrays count to their last digit."""
+    with np.printoptions(threshold=sys.maxsize, floatmode="unique"):
+        return hashlib.sha256(repr(scene).encode()).hexdigest()
 
 
 def _read_plan(path: Path) -> dict[str, Any]:

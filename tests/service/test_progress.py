@@ -14,7 +14,7 @@ import pytest
 from service import formats
 from service.cli import main, progress
 from service.cli.exit_codes import INTERRUPTED
-from service.cli.progress import counted, shown_progress
+from service.cli.progress import counted, resumable, shown_progress
 from slipcore.contact import Scene, simulate
 
 
@@ -67,6 +67,17 @@ def test_the_time_left_is_told_once_it_is_known_which_part_is_done(
         line.tell(0.5)
         line.end()
     assert capsys.readouterr().err == "\rthinking: 30 s, 90 s left\rthinking: 10 min, 10 min left\n"
+
+
+def test_ctrl_c_says_what_a_folder_holds_and_how_to_go_on(capsys: pytest.CaptureFixture[str]) -> None:
+    def stopped() -> Iterator[int]:
+        yield from range(2)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        resumable(stopped(), 3, "logs", Path("there"))
+    assert "2 of 3 logs are in there; the same command makes the others" in capsys.readouterr().err
+    assert resumable(range(3), 3, "logs", Path("there")) == [0, 1, 2]
 
 
 @pytest.mark.usefixtures("impatient", "on_a_terminal")

@@ -1,11 +1,12 @@
 """Files and folders that are written whole or not at all."""
 
 import os
+from errno import ENOSPC
 from pathlib import Path
 
 import pytest
 
-from service.whole_files import write_whole
+from service.whole_files import check_place, write_whole
 from tests.forking import ForkedProcess
 
 
@@ -126,3 +127,40 @@ def test_where_no_file_may_be_made_the_one_that_was_to_be_is_named(tmp_path: Pat
         with pytest.raises(OSError) as refusal:  # noqa: PT011
             write_whole(path, half_a_file)
         assert refusal.value.filename == str(path)
+
+
+def full(path: Path) -> None:
+    path.write_text("half")
+    raise OSError(ENOSPC, "No space left on device")
+
+
+def missing(_: Path) -> None:
+    Path("nowhere/input").read_text()
+
+
+def test_of_a_full_disk_the_file_is_named_and_what_is_read_keeps_its_own_name(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No space left") as refusal:
+        write_whole(tmp_path / "log", full)
+    assert (refusal.value.errno, refusal.value.filename) == (ENOSPC, str(tmp_path / "log"))
+    with pytest.raises(FileNotFoundError) as unread:
+        write_whole(tmp_path / "log", missing)
+    assert unread.value.filename == "nowhere/input"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_is_checked_before_anything_is_written_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    check_place(tmp_path / "new" / "deep" / "file")
+    (tmp_path / "file").write_text("before")
+    check_place(tmp_path / "file")
+    os.mkfifo(tmp_path / "pipe")
+    for place, kind in (
+        (tmp_path, IsADirectoryError),
+        (tmp_path / "file" / "log", NotADirectoryError),
+        (tmp_path / "pipe", FileExistsError),
+    ):
+        with pytest.raises(kind, match=place.name):
+            check_place(place)
+    monkeypatch.setattr(os, "access", lambda *_: False)  # a test may run as root
+    with pytest.raises(PermissionError, match="log"):
+        check_place(tmp_path / "log")
+    assert {path.name for path in tmp_path.iterdir()} == {"file", "pipe"}

@@ -11,6 +11,7 @@ from service.jobs import campaign
 from service.jobs.campaign import RequestedAccuracy
 from service.processes import spawned
 from slipcore.contact import Scene
+from slipcore.contact.effects import MeasuredSurface, SensorSampling
 from slipcore.errors import InvalidInput
 from tests.executors import Here
 
@@ -81,6 +82,33 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     made = list(campaign.run(again, [scene()], range(3), tmp_path, QUICK))
     assert [options["seed"] for options in again.options] == [1, 2]
     assert sorted(outcome.seed for outcome in made) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("written_as", campaign.FORMATS)
+@pytest.mark.parametrize("left", [0, 2, 0.5, 0.999])
+def test_a_log_that_was_cut_is_made_again(tmp_path: Path, written_as: str, left: float) -> None:
+    """A crash of the system leaves less than was written of a file that has its name."""
+    first = campaign.run(Here(), [scene()], range(2), tmp_path, QUICK, written_as)
+    cut, whole = sorted(first, key=lambda outcome: outcome.seed)
+    content = cut.path.read_bytes()
+    cut.path.write_bytes(content[: int(left if left > 1 else left * len(content))])
+    again = Here()
+    made = list(campaign.run(again, [scene()], range(2), tmp_path, QUICK, written_as))
+    assert [options["seed"] for options in again.options] == [0]
+    assert not any(outcome.refused for outcome in made)
+    assert formats.read(cut.path).truth is not None
+    assert {outcome.path for outcome in made} == {cut.path, whole.path}
+
+
+def test_maps_that_differ_anywhere_are_other_scenes(tmp_path: Path) -> None:
+    heights = np.zeros((40, 40))
+    scenes = []
+    for step in (0.0, 1e-12):
+        heights[20, 20] = step
+        scenes.append(Scene("A map", (MeasuredSurface(heights.copy(), 1e-3), SensorSampling((4, 4)))))
+    list(campaign.run(Here(), scenes[:1], [], tmp_path, QUICK))
+    with pytest.raises(InvalidInput, match="another 'A map' than that in"):
+        list(campaign.run(Here(), scenes[1:], [], tmp_path, QUICK))
 
 
 def test_what_is_refused_is_told_and_the_others_go_on(tmp_path: Path) -> None:
