@@ -179,7 +179,7 @@ def test_each_number_of_the_clients_table_has_its_unit_and_reason() -> None:
         assert isinstance(told, ast.Expr)
         assert isinstance(told.value, ast.Constant)
         assert str(told.value.value).startswith(("-, ", "N "))
-    assert len(kinds) == 18
+    assert len(kinds) == 21
 
 
 READERS = ROOT / "service/formats"

@@ -66,6 +66,18 @@ LEAST_NOISE = 0.005
 """-, 0 to 0.05, in parts of the load: the least that its noise counts as where a slide is looked for, a tenth of
 ``steady_share``: else the smallest change of a load next to free of noise would be a slide."""
 
+FALL_FRAMES = 4
+"""-, 2 to 10: frames within which the stick ratio falls at once: as soon as a slide shows in it, most of it does."""
+
+FALL = 0.3
+"""-, 0.1 to 0.6, in parts of what the contact can bear: the stick ratio falls at once where by it so much more is borne
+within ``FALL_FRAMES``. A grip that is relaxed by 1 % a frame makes 0.04; a slide made 0.3 and more in 11 of 13."""
+
+FALLING = 0.4
+"""-, 0.3 to 1: of ``slide_deviations``, so many are enough for a slide while the stick ratio falls at once: by both
+together 2 of 480 grips that held were taken for sliding; by the stick ratio alone half of all are, by 0.6 of the
+deviations alone a sixth."""
+
 BORNE = 0.8
 """-, 0.5 to 1: of the largest load over force that a contact bore: what its friction is no less than, with the noise
 of both, and under twice the force where friction falls with its cube root (Hertz)."""

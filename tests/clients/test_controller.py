@@ -728,6 +728,46 @@ def test_what_slides_unseen_as_its_grip_is_relaxed_is_held_by_the_friction_that_
     assert 1.0 < episode.normal[-1] / episode.least < 1.25
 
 
+def test_a_slide_is_pressed_as_slip_is_in_the_frame_that_shows_it() -> None:
+    """The friction that it shows asks for a tenth more, under which what moves already slides on."""
+    state, normal, mode = GraspController.init(SETTINGS), 5.0, "feel"
+    for frame in range(1, 300):
+        load = min(1.5, 0.45 * normal)
+        state, command = GraspController.step(state, Observation(frame * FRAME, normal, load, 0.0, 1.0))
+        if mode == "learn" and command.mode == "hold":
+            break
+        normal, mode = command.normal_force, command.mode
+    assert command.reason == "slip"
+    assert command.normal_force == pytest.approx((1.0 + SETTINGS.reflex_gain) * normal)
+    assert state.known is not None
+    assert state.known.expected(5.0) == pytest.approx(0.45)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_grip_is_relaxed_no_further_than_what_discarded_a_model_bears(friction: float) -> None:
+    """The detector sees nothing slip: 1.5 N under a force that falls by half a second."""
+    state, normal = dataclasses.replace(GraspController.init(SETTINGS), refuted=friction), 8.0
+    for frame in range(1, 300):
+        state, command = GraspController.step(state, Observation(frame * FRAME, normal, 1.5, 0.0, 1.0))
+        normal = command.normal_force
+    assert command.mode == "learn"
+    bears = friction * utilisation(SETTINGS.reflex_stick_ratio)
+    assert normal == pytest.approx(1.5 / bears if friction else 8.0 * (1.0 - FRAME / 2.0) ** 287, rel=0.02)
+
+
+@pytest.mark.parametrize("load", [0.5, 0.7])
+def test_what_discards_a_model_leaves_the_friction_that_it_shows(load: float, make_model: Make) -> None:
+    """That of the samples, 0.34, or of the load that was borne, less its noise."""
+    state, frame = GraspController.init(SETTINGS, model_of(make_model, 0.45)), 0
+    seen = SlipSamples(np.full(12, 0.34), np.full(12, 0.05))
+    while state.known is not None:
+        frame += 1
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, load, 0.0, 0.3, seen))
+    assert command.mode == "alarm"
+    assert state.refuted == pytest.approx(max(0.34, state.sticking.bore), rel=1e-12)
+    assert state.sticking.bore == pytest.approx(load / 2.0, rel=0.05)
+
+
 @pytest.mark.parametrize(("mode", "counts"), [("hold", True), ("learn", False)])
 def test_elements_at_rest_are_no_warning_while_a_grip_is_relaxed(mode: Any, counts: bool, make_model: Make) -> None:
     state = dataclasses.replace(GraspController.init(SETTINGS, model_of(make_model, 0.45)), mode=mode)

@@ -9,11 +9,13 @@ import pytest
 from stiction_client import Contact, ControlSettings
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.relaxation import Relaxation
-from stiction_client.defaults import LEAST_NOISE
+from stiction_client.controller.stick_ratio import StickRatioEstimate
+from stiction_client.defaults import FALL, FALLING, LEAST_NOISE
 
 SETTINGS = ControlSettings(contact=Contact(6e-5), least_force=0.5, most_force=40.0, slide_deviations=5.0)
 NOISE = 0.02
 HELD = Relaxation(since=1.0, load=1.0, frames=100, start=2.5)
+BORE = StickRatioEstimate(bore=0.4)
 
 
 def at_rest(size: float, noise: float = NOISE) -> LoadEstimate:
@@ -70,15 +72,24 @@ def test_a_load_that_is_known_from_a_few_frames_is_not_lost_yet() -> None:
 def test_a_contact_slides_once_noise_does_not_explain_what_is_lost() -> None:
     evidence = 0.5 * (SETTINGS.slide_deviations * NOISE) ** 2
     found = replace(HELD, sliding=3, bore=2.7, pressed=6.7, expected=2.0 * evidence, lost=2.0 * evidence)
-    assert not found.slides(at_rest(0.9), 0.4, SETTINGS)
-    assert replace(found, lost=2.0 * evidence + 1e-9).slides(at_rest(0.9), 0.4, SETTINGS)
+    assert not found.slides(at_rest(0.9), BORE, SETTINGS)
+    assert replace(found, lost=2.0 * evidence + 1e-9).slides(at_rest(0.9), BORE, SETTINGS)
 
 
 def test_what_is_little_of_the_load_is_no_slide_however_little_that_scatters() -> None:
     evidence = 0.5 * (SETTINGS.slide_deviations * LEAST_NOISE) ** 2
     found = replace(HELD, sliding=3, bore=2.7, pressed=6.7, expected=2.0 * evidence, lost=2.0 * evidence)
-    assert not found.slides(at_rest(0.9, 1e-6), 0.4, SETTINGS)
-    assert replace(found, lost=2.0 * evidence + 1e-9).slides(at_rest(0.9, 1e-6), 0.4, SETTINGS)
+    assert not found.slides(at_rest(0.9, 1e-6), BORE, SETTINGS)
+    assert replace(found, lost=2.0 * evidence + 1e-9).slides(at_rest(0.9, 1e-6), BORE, SETTINGS)
+
+
+@pytest.mark.parametrize(("fallen", "slides"), [(0.0, False), (FALL, False), (1.01 * FALL, True)])
+def test_less_is_enough_while_the_stick_ratio_falls_at_once(fallen: float, slides: bool) -> None:
+    evidence = 0.5 * (FALLING * SETTINGS.slide_deviations * NOISE) ** 2
+    found = replace(HELD, sliding=3, bore=2.7, pressed=6.7, expected=2.0 * evidence, lost=2.0 * evidence + 1e-9)
+    falls = replace(BORE, stick_ratio=0.5, used=(0.0, 0.0, fallen))
+    assert found.slides(at_rest(0.9), falls, SETTINGS) is slides
+    assert not replace(found, lost=2.0 * evidence).slides(at_rest(0.9), falls, SETTINGS)
 
 
 def test_a_load_that_is_taken_away_is_no_slide() -> None:
@@ -86,15 +97,15 @@ def test_a_load_that_is_taken_away_is_no_slide() -> None:
     assert after((0.6, 2.4)) == Relaxation(1.0, 0.6, 1)
     evidence = 1.01 * (SETTINGS.slide_deviations * NOISE) ** 2
     found = replace(HELD, sliding=3, bore=2.7, pressed=6.7, expected=evidence, lost=evidence)
-    assert found.slides(at_rest(0.9), 0.50, SETTINGS)
-    assert not found.slides(at_rest(0.9), 0.51, SETTINGS)
-    assert not replace(found, lost=2.1 * evidence).slides(at_rest(0.9), 0.5, SETTINGS)
+    assert found.slides(at_rest(0.9), replace(BORE, bore=0.50), SETTINGS)
+    assert not found.slides(at_rest(0.9), replace(BORE, bore=0.51), SETTINGS)
+    assert not replace(found, lost=2.1 * evidence).slides(at_rest(0.9), replace(BORE, bore=0.5), SETTINGS)
 
 
 def test_a_grip_relaxed_by_half_a_second_s_rate_is_seen_to_slide_within_150_ms() -> None:
     """A load of 1 N on a contact that slides: it bears 1/120 less in each frame."""
     found, frames = replace(HELD, start=1.0 / 0.45), 0
-    while not found.sliding or not found.slides(at_rest(1.0), 0.45, SETTINGS):
+    while not found.sliding or not found.slides(at_rest(1.0), replace(BORE, bore=0.45), SETTINGS):
         frames += 1
         force = 1.0 - frames / 120.0
         found = found.step(at_rest(force), force / 0.45, relaxed=True)
@@ -110,7 +121,7 @@ def test_noise_alone_is_not_taken_for_sliding() -> None:
         for frame in range(140):
             size = 1.0 + NOISE * generator.standard_normal()
             found = found.step(at_rest(size), 4.0 * 0.9917 ** max(frame - 12, 0), relaxed=frame >= 12)
-            assert not found.sliding or not found.slides(at_rest(1.0), 0.0, SETTINGS)
+            assert not found.sliding or not found.slides(at_rest(1.0), StickRatioEstimate(), SETTINGS)
 
 
 def test_a_grip_that_is_pressed_again_after_it_slipped_is_not_taken_for_one_that_slides() -> None:
@@ -119,4 +130,4 @@ def test_a_grip_that_is_pressed_again_after_it_slipped_is_not_taken_for_one_that
     for frame in range(90):
         normal = 5.0 - frame / 60.0
         found = found.step(at_rest(1.0 + NOISE * generator.standard_normal()), normal, relaxed=frame >= 12)
-        assert not found.sliding or not found.slides(at_rest(1.0), 0.4, SETTINGS)
+        assert not found.sliding or not found.slides(at_rest(1.0), BORE, SETTINGS)

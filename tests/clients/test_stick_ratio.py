@@ -9,6 +9,7 @@ from stiction_client.contacts import Contact
 from stiction_client.controller.friction import utilisation
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.stick_ratio import StickRatioEstimate
+from stiction_client.defaults import FALL_FRAMES
 
 SETTINGS = ControlSettings(contact=Contact.flat(1e-4), least_force=0.5, most_force=30.0)
 NOTHING = StickRatioEstimate()
@@ -47,6 +48,24 @@ def test_without_a_ratio_the_time_of_the_last_one_stands_and_no_slip_is_counted(
     lost = known.step(Observation(9.0, 4.0, 1.0), LoadEstimate(1.0), SETTINGS)
     assert (lost.time, lost.friction, lost.slipping) == (3.0, known.friction, 0)
     assert math.isnan(lost.stick_ratio)
+
+
+def test_it_falls_where_more_is_used_than_a_few_frames_before() -> None:
+    """By what the contact can bear: from 0.95 to 0.55 0.52 of it, and from 0.3 to 0 only 0.16. Above
+    ``feel_stick_ratio`` a ring comes back as soon that slipped before the grip was pressed again.
+    """
+    known = step(NOTHING, 0.95)
+    for _ in range(FALL_FRAMES - 1):
+        known = step(known, 0.95)
+        assert not known.falls(SETTINGS)
+    assert step(known, 0.55).falls(SETTINGS)
+    assert not step(known, 0.56).falls(SETTINGS)
+    assert not step(step(known, math.nan), 0.55).falls(SETTINGS)
+    assert not step(known, math.nan).falls(SETTINGS)
+    for ratio in (0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.3, 0.3, 0.3, 0.3, 0.3):
+        known = step(known, ratio)
+    assert not known.falls(SETTINGS)
+    assert not step(known, 0.0).falls(SETTINGS)
 
 
 def test_slip_is_that_of_frames_in_a_row_up_to_the_reflex_ratio() -> None:

@@ -25,8 +25,9 @@ class ControllerState:
     as all of the contact can bear by it; ``since``: when ``mode`` began, s;
     ``doubts``: whether slip that is told may be none: while nothing is known of the object, and no alarm was raised;
     ``still``: frames in which elements were told to slip as the grip is relaxed, and hardly any moved;
-    ``rested``: whether a load has come to rest, until which the first touch lasts; ``relaxation``: what a
-    grip that is being relaxed bears; ``recognition``: the materials that it may be of; ``material``: which it was
+    ``rested``: whether a load has come to rest, until which the first touch lasts; ``refuted``: the friction that the
+    grasp had by what discarded a model, 0 before; ``relaxation``: what a grip that is being relaxed bears;
+    ``recognition``: the materials that it may be of; ``material``: which it was
     taken for, and its ``probability``.
     """
 
@@ -44,6 +45,7 @@ class ControllerState:
     doubts: bool = False
     still: int = 0
     rested: bool = False
+    refuted: float = 0.0
     relaxation: Relaxation = field(default_factory=Relaxation)
     recognition: GripRecognition | None = None
     material: str | None = None
@@ -229,7 +231,7 @@ def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
-    if state.relaxation.slides(state.load, state.sticking.bore, settings):
+    if state.relaxation.slides(state.load, state.sticking, settings):
         return _enter(_slid(state), "hold")
     if state.known is not None and _refuted(state, state.known, observation.normal):
         return _enter(_forgotten(state), "alarm")
@@ -258,14 +260,20 @@ def _relaxes(state: ControllerState, observation: Observation) -> bool:
 
 
 def _slid(state: ControllerState) -> ControllerState:
-    """With the friction that a contact has which slid as its grip was relaxed, whatever was known before."""
-    known = KnownFriction.slid(state.relaxation.bears, state.settings)
-    return replace(state, known=known, learned=LearnedFriction(), relaxation=Relaxation(), recognition=None)
+    """With the friction that a contact has which slid as its grip was relaxed, whatever was known before.
+
+    It slides on until it is pressed by more than that asks for: the load counts as overload at once.
+    """
+    known, frames = KnownFriction.slid(state.relaxation.bears, state.settings), state.settings.reflex_frames
+    state = replace(state, known=known, overloaded=frames, recognition=None)
+    return replace(state, learned=LearnedFriction(), relaxation=Relaxation())
 
 
 def _forgotten(state: ControllerState) -> ControllerState:
-    """Without what was known, and all that was learnt with it."""
-    return replace(state, known=None, learned=LearnedFriction(), contradictions=0, material=None, probability=0.0)
+    """Without what was known, and all that was learnt with it, but for the friction that there was by it."""
+    refuted = max(state.learned.mean if state.learned.values else 0.0, state.sticking.bore)
+    state = replace(state, known=None, material=None, probability=0.0)
+    return replace(state, learned=LearnedFriction(), contradictions=0, refuted=refuted)
 
 
 def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> bool:
@@ -357,6 +365,9 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     if state.mode == "learn" and lowest > 0.0:
         friction = max(lowest, least)  # what sticks, taken for slip, would ask for ever more
         demands.append(_Demand(load / friction, "samples of slip"))
+    if state.mode == "learn" and state.refuted > 0.0:
+        friction = max(state.refuted * utilisation(settings.reflex_stick_ratio), least)
+        demands.append(_Demand(load / friction, "slip before"))
     if state.known is not None:
         most = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
         return [each if each.reason == "slip" else _Demand(min(each.force, most), each.reason) for each in demands]

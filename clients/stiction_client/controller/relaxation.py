@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.settings import ControlSettings
-from stiction_client.defaults import BORNE, KNOWN_FRAMES, LEAST_NOISE, REST_FRAMES, TAKEN_AWAY
+from stiction_client.controller.stick_ratio import StickRatioEstimate
+from stiction_client.defaults import BORNE, FALLING, KNOWN_FRAMES, LEAST_NOISE, REST_FRAMES, TAKEN_AWAY
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +60,14 @@ class Relaxation:
         """Load over force of the frames in which the contact slides, its friction."""
         return self.bore / self.pressed
 
-    def slides(self, load: LoadEstimate, bore: float, settings: ControlSettings) -> bool:
+    def slides(self, load: LoadEstimate, sticking: StickRatioEstimate, settings: ControlSettings) -> bool:
         """Whether a slide explains the loads so much better that noise does not, and no load that is taken away.
 
-        What slides bears its friction of its force, which is no less than what it ``bore`` of it before.
+        Less is enough while the stick ratio falls: a slide of all elements alike is slow to show in it, but then at
+        once. What slides bears its friction of its force, which is no less than what it bore of it before.
         """
         evidence, noise = self.lost - 0.5 * self.expected, max(load.noise, LEAST_NOISE * self.load)
-        if evidence <= 0.5 * (settings.slide_deviations * noise) ** 2 or self.lost > 2.0 * self.expected:
+        deviations = settings.slide_deviations * (FALLING if sticking.falls(settings) else 1.0)
+        if evidence <= 0.5 * (deviations * noise) ** 2 or self.lost > 2.0 * self.expected:
             return False
-        return self.bears >= BORNE * bore
+        return self.bears >= BORNE * sticking.bore

@@ -7,7 +7,7 @@ from stiction_client.controller.friction import utilisation
 from stiction_client.controller.load import LoadEstimate
 from stiction_client.controller.records import Observation
 from stiction_client.controller.settings import ControlSettings
-from stiction_client.defaults import BORNE, REST_FRAMES, TAKEN_AWAY
+from stiction_client.defaults import BORNE, FALL, FALL_FRAMES, REST_FRAMES, TAKEN_AWAY
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class StickRatioEstimate:
     bore, which its friction is no less than; ``highest``: the same of the ``load``, N, a mean, that is at rest now:
     while it is pressed harder, all of it sticks (Mindlin and Deresiewicz, 1953), and a detector may go on seeing what
     slipped before. Then the stick ratio ``shows`` nothing. ``before_rest``: the friction that it showed
-    before the load came to rest.
+    before the load came to rest. ``used``: the share of what the contact can bear, by the latest stick ratios.
     """
 
     time: float = -math.inf
@@ -30,6 +30,7 @@ class StickRatioEstimate:
     load: float = 0.0
     shows: bool = True
     before_rest: float = math.nan
+    used: tuple[float, ...] = ()
 
     def step(self, observation: Observation, load: LoadEstimate, settings: ControlSettings) -> "StickRatioEstimate":
         """The same after a frame under a ``load``.
@@ -47,7 +48,8 @@ class StickRatioEstimate:
         slipping = self.slipping + 1 if ratio <= settings.reflex_stick_ratio else 0
         time = self.time if math.isnan(ratio) else observation.time
         before_rest = self.before_rest if math.isfinite(load.steady) else friction
-        return StickRatioEstimate(time, ratio, friction, slipping, bore, highest, mean, shows, before_rest)
+        used = () if math.isnan(ratio) else (*self.used, utilisation(ratio))[-FALL_FRAMES - 1 :]
+        return StickRatioEstimate(time, ratio, friction, slipping, bore, highest, mean, shows, before_rest, used)
 
     def confirmed(self) -> "StickRatioEstimate":
         """With no less friction than was shown before the load came to rest: none where none was shown."""
@@ -76,6 +78,13 @@ class StickRatioEstimate:
             return 0.0
         friction = max(self.friction, least)
         return load / (friction * utilisation(stick_ratio)) if friction > 0.0 else math.inf
+
+    def falls(self, settings: ControlSettings) -> bool:
+        """Whether the stick ratio falls sooner than a grip that is being relaxed makes it, below ``feel_stick_ratio``.
+
+        Above it a ring that slipped before a grip was pressed again comes back as soon.
+        """
+        return self.stick_ratio <= settings.feel_stick_ratio and self.used[-1] - min(self.used) > FALL
 
     def slips(self, settings: ControlSettings) -> bool:
         """Whether next to nothing sticks, and not by an error of one frame."""
