@@ -28,22 +28,47 @@ def picture_folder(arguments: argparse.Namespace) -> Path:
     return pictures
 
 
-def write(numbers: object, tables: Mapping[str, str], arguments: argparse.Namespace, name: str) -> None:
-    """Write the numbers as JSON, and renew the page if there is one."""
+def write(
+    numbers: object, tables: Mapping[str, str], arguments: argparse.Namespace, name: str, partly: bool = False
+) -> None:
+    """Write the numbers as JSON, and renew the page if there is one, or ``partly`` what of its tables is made anew."""
     (arguments.output / name).write_text(json.dumps(numbers, indent=1), encoding="utf-8")
     if arguments.page is not None:
-        renew(arguments.page, tables)
+        renew(arguments.page, tables, partly)
 
 
-def renew(page: Path, tables: Mapping[str, str]) -> None:
-    """Put Markdown tables, by name, in the place of those that the page has."""
+def renew(page: Path, tables: Mapping[str, str], partly: bool = False) -> None:
+    """Put Markdown tables, by name, in the place of those that the page has; ``partly``: their cells alone."""
     text = page.read_text(encoding="utf-8")
-    for name, table in tables.items():
-        pattern = rf"(<!-- table {re.escape(name)} -->\n).*?(<!-- end -->)"
-        text, count = re.subn(pattern, lambda found, made=table: f"{found[1]}{made}\n{found[2]}", text, flags=re.DOTALL)
-        if count != 1:
-            raise SystemExit(f"{page} has {count} places for the table {name}; needed: one")
+    for name, made in tables.items():
+        pattern = rf"(<!-- table {re.escape(name)} -->\n)(.*?)\n?(<!-- end -->)"
+        found = list(re.finditer(pattern, text, flags=re.DOTALL))
+        if len(found) != 1:
+            raise SystemExit(f"{page} has {len(found)} places for the table {name}; needed: one")
+        head, old, end = found[0].groups()
+        text = text.replace(found[0][0], f"{head}{merged(old, made) if partly else made}\n{end}")
     page.write_text(text, encoding="utf-8")
+
+
+def merged(old: str, new: str) -> str:
+    """An old Markdown table with the cells that a new one has, by what begins their row and heads their column."""
+    columns, *rows = _cells(old)
+    heads, *changed = _cells(new)
+    cells = {(row[0], head): cell for row in changed for head, cell in zip(heads, row, strict=True)}
+    unknown = [row[0] for row in changed if row[0] not in [each[0] for each in rows]] + [
+        head for head in heads if head not in columns
+    ]
+    if unknown:
+        raise SystemExit(f"the page's table has no {', '.join(unknown)}; make it anew as a whole")
+    return table(
+        columns, [[cells.get((row[0], head), was) for head, was in zip(columns, row, strict=True)] for row in rows]
+    )
+
+
+def _cells(text: str) -> list[list[str]]:
+    """Of a Markdown table, without the line below its head."""
+    lines = [line.strip().removeprefix("| ").removesuffix(" |").split(" | ") for line in text.strip().splitlines()]
+    return [lines[0], *lines[2:]]
 
 
 def save(picture: Figure, path: Path) -> None:

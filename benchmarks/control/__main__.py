@@ -2,13 +2,14 @@
 
 Each strategy (benchmarks/control/strategies.py) does each task (benchmarks/control/tasks.py) in the reduced world, with
 the real detector on noisy frames, from each seed (friction of the grasp, its field, noise). Writes control.json and
-control.png. With `--keep FILE` outcomes are kept as they come, and a campaign that was stopped goes on.
+control.png. With `--keep FILE` outcomes are kept as they come, and a campaign that was stopped goes on. With
+`--only STRATEGY …` the page's figures of the other strategies are kept as they are.
 """
 
 import argparse
 import json
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from pathlib import Path
@@ -49,22 +50,23 @@ def main() -> None:
     """Run, draw and write."""
     arguments = _arguments()
     groups = zip((CONTROLLERS, MISLED, BASELINES), arguments.seeds, strict=True)
-    seeds = {name: number for names, number in groups for name in names}
+    seeds = {name: number for names, number in groups for name in names if name in arguments.only}
     found = list(campaign(seeds, arguments.processes, arguments.keep))
-    rows = [scores(name, _of(found, TASKS, name)) for name in STRATEGIES]
-    by_task = {group: [scores(name, _of(found, tasks, name)) for name in STRATEGIES] for group, tasks in GROUPS.items()}
+    rows = [scores(name, _of(found, TASKS, name)) for name in seeds]
+    by_task = {group: [scores(name, _of(found, tasks, name)) for name in seeds] for group, tasks in GROUPS.items()}
     step, looked = microseconds(), explorations(arguments.seeds[-1])
     save(draw(), picture_folder(arguments) / "control.png")
     tables = {
         "control": table(list(COLUMNS.values()), [[row[key] for key in COLUMNS] for row in rows]),
-        "control tasks": _groups_table(by_task),
-        "control controller": _controller_table(found),
-        "control signatures": _signatures_table(found),
+        "control tasks": _groups_table(seeds, by_task),
+        "control controller": _controller_table(seeds, found),
+        "control signatures": _signatures_table(seeds, found),
     }
     costs = {"episode_s": median([each.seconds for each in found]), "all_s": sum(each.seconds for each in found)}
     print(*tables.values(), f"a step: {step:.0f} µs of CPU time; an exploration: {looked:.2f} s", costs, sep="\n\n")
-    numbers = {"seeds": seeds, "strategies": rows, "tasks": by_task, "lifts": _lifts(found), "cpu": costs}
-    write(numbers | {"step_us": step, "exploration_s": looked}, tables, arguments, "control.json")
+    numbers = {"seeds": seeds, "strategies": rows, "tasks": by_task, "lifts": _lifts(seeds, found), "cpu": costs}
+    partly = len(seeds) < len(STRATEGIES)
+    write(numbers | {"step_us": step, "exploration_s": looked}, tables, arguments, "control.json", partly)
 
 
 def _arguments() -> argparse.Namespace:
@@ -72,6 +74,7 @@ def _arguments() -> argparse.Namespace:
     told = "episodes with each task of the controller, of the controller misled, and of what it is compared with"
     parser.add_argument("--seeds", type=int, nargs=3, default=(100, 50, 10), help=told)
     parser.add_argument("--processes", type=int, default=1, help="that share the episodes")
+    parser.add_argument("--only", nargs="+", choices=list(STRATEGIES), default=list(STRATEGIES), metavar="STRATEGY")
     parser.add_argument("--keep", type=Path, help="file of outcomes, one a line; what it has is not run again")
     return parser.parse_args()
 
@@ -125,30 +128,31 @@ def _cell(row: dict[str, object]) -> str:
     return f"{row['held']}, {row['final']:.2f}, {row['slip_mm']:.1f}".replace("nan", "–")
 
 
-def _groups_table(by_task: dict[str, list[dict[str, object]]]) -> str:
+def _groups_table(names: Collection[str], by_task: dict[str, list[dict[str, object]]]) -> str:
     rows = [
-        [name, *map(_cell, scored)]
-        for name, scored in zip(STRATEGIES, zip(*by_task.values(), strict=True), strict=True)
+        [name, *map(_cell, scored)] for name, scored in zip(names, zip(*by_task.values(), strict=True), strict=True)
     ]
     return table(["held, final overgrip, slip in mm", *by_task], rows)
 
 
-def _lifts(found: Sequence[Outcome]) -> dict[str, list[dict[str, object]]]:
-    """Scores of the controllers in each lift."""
-    return {task.name: [scores(name, _of(found, (task,), name)) for name in CONTROLLERS | MISLED] for task in LIFTS}
+def _lifts(names: Collection[str], found: Sequence[Outcome]) -> dict[str, list[dict[str, object]]]:
+    """Scores of the controllers among ``names`` in each lift."""
+    controllers = [name for name in CONTROLLERS | MISLED if name in names]
+    return {task.name: [scores(name, _of(found, (task,), name)) for name in controllers] for task in LIFTS}
 
 
-def _controller_table(found: Sequence[Outcome]) -> str:
-    rows = [[task, *map(_cell, scored)] for task, scored in _lifts(found).items()]
-    return table(["held, final overgrip, slip in mm", *CONTROLLERS, *MISLED], rows)
+def _controller_table(names: Collection[str], found: Sequence[Outcome]) -> str:
+    rows = [[task, *map(_cell, scored)] for task, scored in _lifts(names, found).items()]
+    return table(["held, final overgrip, slip in mm", *(each for each in CONTROLLERS | MISLED if each in names)], rows)
 
 
-def _signatures_table(found: Sequence[Outcome]) -> str:
+def _signatures_table(names: Collection[str], found: Sequence[Outcome]) -> str:
+    shown = [name for name in SHOWN if name in names]
     rows = [
-        [each.name, *(each.tell([one.signature for one in _of(found, (each.task,), name)]) for name in SHOWN)]
+        [each.name, *(each.tell([one.signature for one in _of(found, (each.task,), name)]) for name in shown)]
         for each in SIGNATURES
     ]
-    return table(["median, episodes", *SHOWN], rows)
+    return table(["median, episodes", *shown], rows)
 
 
 def microseconds() -> float:

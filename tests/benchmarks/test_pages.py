@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from benchmarks.pages import picture_folder, renew, save, table, write
+from benchmarks.pages import merged, picture_folder, renew, save, table, write
 
 PAGE = "# Title\n\n<!-- table one -->\nold\n<!-- end -->\n\nText.\n\n<!-- table two -->\n<!-- end -->\n"
 
@@ -25,6 +25,26 @@ def test_only_the_named_table_of_a_page_is_renewed(tmp_path: Path) -> None:
     page.write_text(PAGE)
     renew(page, {"one": r"| new \1 |"})
     assert page.read_text() == PAGE.replace("old", r"| new \1 |")
+
+
+def test_a_part_of_a_table_leaves_the_rest_as_it_is(tmp_path: Path) -> None:
+    old = table(("name", "x", "y"), [("one", 1, 2), ("two", 3, "4, 5")])
+    assert merged(old, table(("name", "x", "y"), [("two", 6, 7)])) == old.replace("| 3 | 4, 5 |", "| 6 | 7 |")
+    assert merged(old, table(("name", "y"), [("one", 8), ("two", 9)])) == old.replace("2", "8").replace("4, 5", "9")
+    assert merged(old, old) == old
+    page = tmp_path / "page.md"
+    page.write_text(PAGE.replace("old", old))
+    renew(page, {"one": table(("name", "x", "y"), [("two", 6, 7)])}, partly=True)
+    assert page.read_text() == PAGE.replace("old", old.replace("| 3 | 4, 5 |", "| 6 | 7 |"))
+
+
+@pytest.mark.parametrize(
+    ("part", "named"), [(("name", "x"), "three"), (("name", "z"), "three, z"), (("other", "x"), "three, other")]
+)
+def test_a_part_that_a_table_does_not_have_is_refused_by_name(part: tuple[str, ...], named: str) -> None:
+    old = table(("name", "x", "y"), [("one", 1, 2), ("two", 3, 4)])
+    with pytest.raises(SystemExit, match=f"has no {named}; make it anew"):
+        merged(old, table(part, [("three", 6)]))
 
 
 @pytest.mark.parametrize(("text", "places"), [("# Title", 0), (PAGE + PAGE, 2)])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from benchmarks.control import __main__ as control
 from benchmarks.control.__main__ import campaign, episode
@@ -27,6 +28,7 @@ from slipcore.contact.reduced import GRAVITY, Load
 from stiction_client import Contact, GraspController, Observation
 
 TASK = LIFTS[4]
+CAMPAIGN = ("control", "control tasks", "control controller", "control signatures")
 
 
 def test_the_least_force_is_the_limit_surface_s() -> None:
@@ -185,6 +187,38 @@ def test_a_campaign_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: py
     assert asked == [(task, 0, ["unknown"]) for task in range(len(ALL))]
     assert [each[:3] for each in again[: len(first)]] == [each[:3] for each in first]
     assert len(list(campaign({"known": 1}, 1, keep))) == len(ALL)
+
+
+def test_only_some_strategies_leave_the_page_s_figures_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def outcomes(seeds: dict[str, int], *_: object) -> list[control.Outcome]:
+        final = 1.25 if len(seeds) == 1 else 2.0
+        return [
+            outcome_of(dataclasses.replace(made([final] * 16), task=task.name), name, 0)
+            for name in seeds
+            for task in ALL
+        ]
+
+    page, before = tmp_path / "page.md", "".join(f"<!-- table {name} -->\n<!-- end -->\n" for name in CAMPAIGN)
+    page.write_text(before, encoding="utf-8")
+    for name, value in (("campaign", outcomes), ("draw", Figure), ("microseconds", lambda: 1.0)):
+        monkeypatch.setattr(control, name, value)
+    monkeypatch.setattr(control, "explorations", lambda _: 0.7)
+    command = ["control", "--output", str(tmp_path), "--page", str(page)]
+    monkeypatch.setattr("sys.argv", command)
+    control.main()
+    whole = page.read_text(encoding="utf-8").splitlines()
+    monkeypatch.setattr("sys.argv", [*command, "--only", "unknown"])
+    control.main()
+    changed = [
+        (old, new) for old, new in zip(whole, page.read_text(encoding="utf-8").splitlines(), strict=True) if old != new
+    ]
+    rows, columns = changed[:2], changed[2:]
+    assert all(old.startswith("| unknown |") and "1.25" in new for old, new in rows)
+    assert len(columns) == len(LIFTS)
+    assert all(new.split(" | ")[2].startswith("1/1, 1.25") for _, new in columns)
+    assert all(new.split(" | ")[1] == old.split(" | ")[1] for old, new in columns)
 
 
 def test_there_are_twelve_lifts_and_the_paper_s_six_tasks_by_names_of_their_own() -> None:
