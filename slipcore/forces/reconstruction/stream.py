@@ -152,7 +152,7 @@ class ForceStream:
         if reader is None:
             return self._unknown("contact", known)
         n, m = self._position.shape[:2]
-        forces = reader.read(frame.data, (n, m))
+        forces = self._tracking.read(reader, frame, (n, m))
         return StreamedForces(forces, time - self._tracking.time, None, reader.given, self._compare(frame, forces))
 
     def _force_deviation(self, forces: FrameForces) -> float:

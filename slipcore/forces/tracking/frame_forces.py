@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import binary_fill_holes, maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
+from slipcore.forces.inverse.fit import TractionMean
 from slipcore.forces.recording import OUTWARD
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
@@ -128,14 +129,21 @@ class Reader:
         """Whether the normal resultant was known from elsewhere."""
         return bool(np.isfinite(self.key.observation.noise[-1]))
 
-    def read(self, data: FloatArray, grid: tuple[int, int], estimate: FrameEstimate | None = None) -> FrameForces:
+    def read(
+        self,
+        data: FloatArray,
+        grid: tuple[int, int],
+        estimate: FrameEstimate | None = None,
+        wider: TractionMean | None = None,
+    ) -> FrameForces:
         """Forces of a frame's ``data`` [m] m on elements of this grid; what the fit leaves unexplained beyond noise
-        widens their deviations. ``estimate``: that by other frames, too.
+        widens their deviations. ``estimate``: that by other frames, too; ``wider``: on a contact that may be the
+        frame's as well as the key's.
         """
         known = FrameEstimate(self.key.fit.mean(data), data) if estimate is None else estimate
         traction = self.key.fit.traction(known.mean)
         misfit = self._misfit(traction, data)
-        of_elements, of_wrench = self._deviations(traction, known, misfit)
+        of_elements, of_wrench = self._deviations(traction, known, misfit, wider)
         wrench = self._wrench(traction)
         force = ((self.elements @ traction.T) * OUTWARD).reshape(*grid, 3)
         largest = RECONSTRUCTION.element_error * np.abs(force).max()
@@ -181,10 +189,13 @@ class Reader:
         covered = self.elements.sum(axis=1).reshape(normal.shape) > RECONSTRUCTION.covered * self.sensor.load
         return np.asarray(_touching(normal, np.hypot(noise, RECONSTRUCTION.element_error * largest)) & covered)
 
-    def _deviations(self, traction: FloatArray, known: FrameEstimate, misfit: float) -> tuple[FloatArray, FloatArray]:
+    def _deviations(
+        self, traction: FloatArray, known: FrameEstimate, misfit: float, wider: TractionMean | None
+    ) -> tuple[FloatArray, FloatArray]:
         """Standard deviations of elements' forces [3, e] N and of the wrench [4], N and N m: by the data, by what
         bilinear tractions leave wrong, by how much the bound on pulling changes what the data say, and by what other
-        contacts are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382).
+        contacts are as probable (the variance between models; Hoeting et al., Stat. Sci. 14 (1999) 382), all of what
+        a ``wider`` one does.
         """
         linear = known.mean
         bound = traction - linear
@@ -192,7 +203,8 @@ class Reader:
         of_elements = (misfit * self.deviation) ** 2 + (bound @ self.elements.T) ** 2
         of_elements[:, self.unresolved.near] += unresolved**2
         total = (misfit * self.total) ** 2 + of_wrench**2 + self._wrench(bound) ** 2
-        for probability, fit in self.key.others:
+        others = self.key.others if wider is None else (*self.key.others, (1.0, wider))
+        for probability, fit in others:
             other = fit.mean(known.data)
             differs = other @ self.sensor.elements[:, fit.support].T - linear @ self.elements.T
             of_elements += probability * differs**2

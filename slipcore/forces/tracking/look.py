@@ -7,11 +7,11 @@ from functools import partial
 import numpy as np
 
 from slipcore.forces.defaults import FORCE_STREAM
-from slipcore.forces.inverse.fit import ObservationModel
+from slipcore.forces.inverse.fit import ObservationModel, TractionMean
 from slipcore.forces.inverse.whole_lattice import WholeLattice
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.recording import error
-from slipcore.forces.tracking.frame_forces import Reader
+from slipcore.forces.tracking.frame_forces import FrameForces, Reader
 from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker, lattice_of
@@ -64,13 +64,15 @@ class Prepared:
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactTracking:
     """What is known of a ``sensor``, and while something touches, of its contact: ``reader`` of forces by the frame at
-    ``time`` s, and the ``size`` m of displacements by which the ``tracker`` began.
+    ``time`` s, and the ``size`` m of displacements by which the ``tracker`` began. ``wider``: tractions on a contact
+    that has grown since, where depth is not seen.
     """
 
     sensor: SensorResponse
     prepared: Prepared | None = None
     tracker: Tracker | None = None
     reader: Reader | None = None
+    wider: TractionMean | None = None
     time: float = 0.0
     size: float = 0.0
 
@@ -99,6 +101,10 @@ class ContactTracking:
         """Whether the contact is that of a frame in which something touches, too."""
         return self.tracker is not None and self.tracker.key.holds(self._observation(frame), frame.data)
 
+    def read(self, reader: Reader, frame: MarkerReading, grid: tuple[int, int]) -> FrameForces:
+        """Forces on elements of this ``grid`` in a frame; less sure once markers have moved on from its contact."""
+        return reader.read(frame.data, grid, wider=None if self.holds(frame) else self.wider)
+
     def _observation(self, frame: MarkerReading) -> ObservationModel:
         return self.sensor.observation(error(frame.moved, frame.seen, frame.noise), frame.known)
 
@@ -114,7 +120,8 @@ class ContactTracking:
         return self._by(tracker.at(self._observation(frame), frame.data), frame)
 
     def _by(self, tracker: Tracker, frame: MarkerReading) -> "ContactTracking":
-        return replace(self, tracker=tracker, reader=Reader.of(self.sensor, tracker.key), time=frame.time)
+        reader, wider = Reader.of(self.sensor, tracker.key), None if self.sensor.sees_depth else tracker.wider()
+        return replace(self, tracker=tracker, reader=reader, wider=wider, time=frame.time)
 
 
 def bytes_needed(position: FloatArray, element_area: float) -> int:

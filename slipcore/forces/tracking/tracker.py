@@ -93,6 +93,11 @@ class Tracker:
         found = fit(observation, self.sensor.nodes, support, self.prior)
         return replace(self, key=Key(observation, data, found))
 
+    def wider(self) -> TractionMean:
+        """Mean tractions on the contact with one row around it: what it may be once markers have moved on."""
+        contact = self.key.fit.support.reshape(self.sensor.nodes.grid.shape)
+        return fit_mean(self.key.observation, self.sensor.nodes, widened(contact, 1).ravel(), self.prior)
+
     @classmethod
     def _sought_in_the_plane(
         cls,

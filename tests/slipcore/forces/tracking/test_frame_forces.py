@@ -44,6 +44,10 @@ def test_contacts_that_are_as_probable_widen_what_is_said_by_how_much_forces_dif
     )
     added = by_both.deviation**2 - by_one.deviation**2
     np.testing.assert_allclose(added.reshape(-1, 3), 0.3 * elements**2, rtol=1e-6, atol=1e-12)
+    moved_on = Reader.of(sensor, alone).read(data, (9, 9), wider=wide)
+    np.testing.assert_array_equal(moved_on.force, by_one.force)
+    added = moved_on.resultant_deviation**2 - by_one.resultant_deviation**2
+    np.testing.assert_allclose(added, apart**2, rtol=1e-6, atol=1e-12)
 
 
 def test_an_element_touches_whose_force_is_beyond_noise_and_not_little_beside_others() -> None:
