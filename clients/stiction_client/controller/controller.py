@@ -26,9 +26,9 @@ class ControllerState:
     ``doubts``: whether slip that is told may be none: while nothing is known of the object, and no alarm was raised;
     ``still``: frames in which elements were told to slip as the grip is relaxed, and hardly any moved;
     ``rested``: whether a load has come to rest, until which the first touch lasts; ``refuted``: the friction that the
-    grasp had by what discarded a model, 0 before; ``relaxation``: what a grip that is being relaxed bears;
-    ``recognition``: the materials that it may be of; ``material``: which it was
-    taken for, and its ``probability``.
+    grasp had by what discarded a model as its grip was relaxed, else 0; ``relaxation``: what a grip that is being
+    relaxed bears; ``recognition``: the materials that it may be of; ``material``: which it was taken for, and its
+    ``probability``.
     """
 
     settings: ControlSettings
@@ -270,8 +270,13 @@ def _slid(state: ControllerState) -> ControllerState:
 
 
 def _forgotten(state: ControllerState) -> ControllerState:
-    """Without what was known, and all that was learnt with it, but for the friction that there was by it."""
-    refuted = max(state.learned.mean if state.learned.values else 0.0, state.sticking.bore)
+    """Without what was known, and all that was learnt with it, but for what a grip that was being relaxed then bore.
+
+    Before a load rests, samples are of a narrow ring, which bears less than its friction, and the load is a small one.
+    """
+    sampled, refuted = state.learned.mean if state.learned.values else 0.0, 0.0
+    if state.mode == "learn":
+        refuted = max(sampled, state.sticking.bore)
     state = replace(state, known=None, material=None, probability=0.0)
     return replace(state, learned=LearnedFriction(), contradictions=0, refuted=refuted)
 
