@@ -25,10 +25,16 @@ def read_log(
     frame_rate: float | None = None,
     rest: str | None = None,
 ) -> "GraspLog":
-    """The log in a file, by what the options of a command say about it."""
+    """The log in a file, by what the options of a command say about it; raises what names the file."""
     from service import formats
+    from slipcore.errors import SlipcoreError
 
-    return formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
+    read_mapping = mapping_text(mapping)
+    try:
+        return formats.read(path, scale=scale, frame_rate=frame_rate, mapping=read_mapping, rest=rest_of(rest))
+    except SlipcoreError as error:
+        error.add_note(f"in {path}")
+        raise
 
 
 def mapping_text(path: Path | None) -> str | None:

@@ -86,6 +86,7 @@ def of_scene(scene: "Scene", seconds: float, seed: int, progress: "Progress") ->
 
 def _ever_finer(scene: "Scene", seconds: float, seed: int, progress: "Progress") -> Iterator[Setting]:
     """Each tier that knows a scene, then each grid, as they are run."""
+    from slipcore.contact.errors import rounded_up
     from slipcore.contact.tiers.accuracy import refinements
     from slipcore.contact.tiers.choice import TIERS
 
@@ -98,7 +99,7 @@ def _ever_finer(scene: "Scene", seconds: float, seed: int, progress: "Progress")
             yield Setting(f'--tier "{tier.NAME}"', perf_counter() - began, known, "known of the tier")
     for made in refinements(plan, seconds, progress):
         error, grid = made.error.largest, f"{made.fidelity.cells} cells, steps a frame: {made.fidelity.substeps}"
-        yield Setting(f"--accuracy {_rounded_up(error):g}", made.seconds, error, grid)
+        yield Setting(f"--accuracy {rounded_up(error):g}", made.seconds, error, grid)
 
 
 def of_detection(log: "GraspLog", name: str, progress: "Progress") -> WorkPrecision:
@@ -183,12 +184,6 @@ def _friction(model: "LinearFriction") -> tuple[float, float]:
     return float(np.dot(middle, model.coefficients)), float(
         special.stdtrit(model.degrees_of_freedom, 0.975)
     ) * deviation
-
-
-def _rounded_up(error: float) -> float:
-    """To two digits, so that what is asked is no less than what was had."""
-    unit = 10.0 ** (math.floor(math.log10(error)) - 1) if error > 0.0 else 1.0
-    return math.ceil(error / unit - 1e-9) * unit
 
 
 def draw(found: Sequence[WorkPrecision]) -> "Figure":

@@ -1,5 +1,7 @@
 """What the contact simulator refuses or could not do."""
 
+import math
+
 from slipcore.errors import InvalidInput, SlipcoreError
 from slipcore.frames import FloatArray, GraspLog
 
@@ -41,7 +43,7 @@ class OutOfReach(InvalidInput, NotConverged):
         self.asked, self.least, self.seconds = asked, least, seconds
         self.what, self.residual, self.tolerance, self.iterations = name, least, asked, 0
         takes = "" if name == "seconds" else f", which takes about {_duration(seconds)}"
-        least_told = f"{_duration(least)} or more" if name == "seconds" else f"{least:.2g} or more"
+        least_told = f"{_duration(least) if name == 'seconds' else f'{rounded_up(least):g}'} or more"
         InvalidInput.__init__(self, name, f"{asked:g}", least_told + takes)
 
     def __reduce__(self) -> tuple[type, tuple[str, float, float, float]]:
@@ -62,10 +64,19 @@ class ManyRuns(InvalidInput):
         return type(self), (self.runs, self.seconds)
 
 
+def rounded_up(value: float) -> float:
+    """To two digits, so that what is asked by it is no less than what can be had."""
+    nearest = float(f"{value:.2g}")
+    if nearest >= value:
+        return nearest
+    return float(f"{nearest + 10.0 ** (math.floor(math.log10(value)) - 1):.2g}")
+
+
 def _duration(seconds: float) -> str:
+    """Never less than it is."""
     if seconds < 100.0:
-        return f"{seconds:.2g} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000.0 else f"{seconds / 3600:.0f} h"
+        return f"{rounded_up(seconds):g} s"
+    return f"{math.ceil(seconds / 60)} min" if seconds < 6000.0 else f"{math.ceil(seconds / 3600)} h"
 
 
 class Interrupted(KeyboardInterrupt):

@@ -6,6 +6,7 @@ from typing import ClassVar
 from slipcore.contact.defaults import RAMP
 from slipcore.contact.plan.entries import check_own_types
 from slipcore.contact.plan.plan import Plan, SamplingPlan
+from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 
 
@@ -29,6 +30,9 @@ class SensorSampling:
             raise InvalidInput("points of the sensor", self.points, "at least 2 each way")
         if not (self.pitch > 0.0 and self.frame_rate > 0.0):
             raise InvalidInput("sensor", self, "pitch above 0 m and frame rate above 0 1/s")
+        across, (low, high) = (max(self.points) - 1) * self.pitch, LIMITS.extent
+        if not across <= high:
+            raise InvalidInput("sensor", f"{across:.3g} m across, by its points and pitch", f"{low:g} to {high:g} m")
 
     @property
     def absent(self) -> bool:

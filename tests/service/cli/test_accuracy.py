@@ -3,6 +3,7 @@
 import json
 import math
 from contextlib import nullcontext
+from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -58,6 +59,14 @@ def test_a_time_that_means_nothing_is_refused_before_anything_is_run(
         main(["accuracy", "table1_condition1", "--seconds", seconds])
     assert left.value.code == INPUT_REFUSED
     assert f"seconds is {seconds} s; allowed: above 0 s" in capsys.readouterr().err
+
+
+def test_a_log_that_cannot_be_read_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (path := tmp_path / "half.npz").write_bytes(b"PK\x03\x04 and no more")
+    with pytest.raises(SystemExit) as left:
+        main(["accuracy", str(path)])
+    assert left.value.code == INPUT_REFUSED
+    assert capsys.readouterr().err.splitlines()[-1] == f"in {path}"
 
 
 def test_what_was_found_until_ctrl_c_is_told(

@@ -188,6 +188,10 @@ def test_frames_are_lost_of_a_log_whose_truth_nobody_knows() -> None:
             lambda: ObjectMotion((0.0,), yaw=(0.0, 1.0)),
             "yaw of ObjectMotion is 2 values; allowed: one for each",
         ),
+        (
+            lambda: SensorSampling((20, 20), 0.75),
+            "sensor is 14.2 m across, by its points and pitch; allowed: 0.0001 to 0.5 m",
+        ),
         (lambda: SensorSampling(frame_rate=0.0), "pitch above 0 m and frame rate above 0 1/s"),
     ],
 )
