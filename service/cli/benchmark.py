@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
-from service.cli.options import Json
+from service.cli.options import Json, drawn_path
 from service.cli.output import plain, print_json, print_table, printable
 from service.cli.progress import counted, resumable, shown_progress
+from service.whole_files import check_place
 
 if TYPE_CHECKING:
     from service.slip_benchmark.running import PredictionRun
@@ -21,6 +22,8 @@ Folder = Annotated[Path, typer.Argument(help="A folder that `stiction benchmark 
 Processes = Annotated[
     int | None, typer.Option(min=1, help="Processes of this machine; as many as it has cores if not said.")
 ]
+OWN_NAME = "external"
+"""Of the results of a program that is given no name."""
 MOST_NAMED = 20
 """Reasons that are printed; all are in the files."""
 
@@ -59,7 +62,7 @@ def run(
     external: Annotated[
         str | None, typer.Option(help="A program of your own: it is given the paths of an input and of its prediction.")
     ] = None,
-    name: Annotated[str, typer.Option(help="What its results are called.")] = "external",
+    name: Annotated[str, typer.Option(help="What its results are called.")] = OWN_NAME,
     limit: Annotated[float, typer.Option(min=0.1, help="Time that the program has for a scene, s.")] = 60.0,
     processes: Processes = None,
     json: Json = False,
@@ -72,7 +75,10 @@ def run(
     from service.slip_benchmark.running import Program
     from service.slip_benchmark.running import run as run_methods
     from slipcore.defaults import METHOD_NAMES
+    from slipcore.errors import InvalidInput
 
+    if external is None and name != OWN_NAME:
+        raise InvalidInput("name", name, "none without --external, the program whose results are called so")
     count = len(read_whole_benchmark(folder).scenes)
     detectors = detector or ([] if external else list(METHOD_NAMES))
     program = Program(name, external, limit) if external else None
@@ -115,7 +121,9 @@ def _named(scenes: list[str]) -> str:
 @app.command()
 def score(
     folder: Folder,
-    picture: Annotated[Path | None, typer.Option(help="Write the picture of F1 to this PNG or SVG, too.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(callback=drawn_path, help="Write the picture of F1 to this PNG or SVG, too.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Score all results: a table here, FOLDER/score.json, and FOLDER/score.html with a picture."""
@@ -125,6 +133,8 @@ def score(
     from service.slip_benchmark.scoring import PAGE, SCORE
     from service.slip_benchmark.scoring import score as score_folder
 
+    if picture is not None:
+        check_place(picture)
     with shown_progress(f"scoring {folder}") as tell:
         scores = score_folder(folder, tell)
     record = plain(scores.as_json())

@@ -23,6 +23,13 @@ def png_path(path: Path | None) -> Path | None:
     return path
 
 
+def drawn_path(path: Path | None) -> Path | None:
+    """The path of a picture, refused where its name is neither a PNG's nor an SVG's; raises ``typer.BadParameter``."""
+    if path is not None and path.suffix.lower() not in (".png", ".svg"):
+        raise typer.BadParameter(f"{path.name}; allowed: a name that ends in .png or .svg")
+    return path
+
+
 Picture = Annotated[Path | None, typer.Option(callback=png_path, help="Write a picture of slip over time to this PNG.")]
 Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pixel.")]
 FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]

@@ -2,7 +2,9 @@
 
 import pytest
 
-from service.cli import benchmark
+from service.cli import benchmark, main
+from service.cli.exit_codes import INPUT_REFUSED
+from service.slip_benchmark import folder
 from service.slip_benchmark.running import PredictionRun
 
 Capture = pytest.CaptureFixture[str]
@@ -21,6 +23,23 @@ def test_predictions_are_counted_by_method_in_the_order_in_which_they_ran(capsys
         "Predictions", ["mine", "1", "of", "3", "5.2"], ["filter", "1", "of", "3", "0.5"]
     )  # fmt: skip
     assert reasons == ["mine, scene 0001 and 1 more: no�[2J"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["score", "sealed", "--picture", "x.txt"], 2, "ends in .png or .svg"),
+        (["run", "sealed", "--name", "mine"], INPUT_REFUSED, "name is mine; allowed: none without --external"),
+    ],
+)
+def test_what_would_be_in_vain_is_refused_first(
+    arguments: list[str], code: int, told: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(folder, "read_whole_benchmark", lambda _: pytest.fail("began"))
+    with pytest.raises(SystemExit) as left:
+        main(["benchmark", *arguments])
+    assert left.value.code == code
+    assert told in " ".join(capsys.readouterr().err.replace("│", " ").split())
 
 
 def test_the_first_twenty_reasons_are_named(capsys: Capture) -> None:
