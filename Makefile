@@ -13,7 +13,8 @@ FIRST := numpy|scipy|numba|llvmlite|setuptools
 # Without bytecode each process takes 3 s longer to start. uv would make it of the packages' own tests too, a quarter
 # of all, and only of what it installs at that moment. What cannot be compiled is nothing that runs here.
 BYTECODE := { $(BIN)/python -W ignore -m compileall -qq -j 0 -x /tests/ $(VENV)/lib || true; }
-CONTACT := from slipcore.contact import Scene, simulate; simulate(Scene.from_toml("table1_condition1"))
+CONTACT := from slipcore.contact import Scene, simulate; \
+    [simulate(Scene.from_toml(f"table1_condition1{layer}")) for layer in ("", "_layer")]
 SAMPLES := from slipcore.warm_up import warm_up_samples; warm_up_samples()
 # The detectors' kernels take most of it, a minute of a core: all others are left to the second process.
 COMPILE_DETECTORS := $(BIN)/python -c 'import slipcore; slipcore.warm_up()'

@@ -16,6 +16,7 @@ from numpy.polynomial import Chebyshev
 from scipy import special
 
 from slipcore.contact.defaults import LAYER
+from slipcore.contact.elasticity.chebyshev import evaluate
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component
 from slipcore.contact.reference.bonded_layer import BondedLayer, LayerModes, half_space_modes
@@ -62,17 +63,17 @@ class LayerBase:
         s = np.arcsinh(0.5 * r / self.thickness)
         match component:
             case "nn":
-                response = functions.normal(s)
+                response = evaluate(functions.normal, s)
             case "xx":
-                response = functions.mean(s) - functions.turning(s) * ((x - y) * (x + y) / r**2)
+                response = evaluate(functions.mean, s) - evaluate(functions.turning, s) * ((x - y) * (x + y) / r**2)
             case "yy":
-                response = functions.mean(s) + functions.turning(s) * ((x - y) * (x + y) / r**2)
+                response = evaluate(functions.mean, s) + evaluate(functions.turning, s) * ((x - y) * (x + y) / r**2)
             case "xy":
-                response = -functions.turning(s) * (2.0 * x * y / r**2)
+                response = -evaluate(functions.turning, s) * (2.0 * x * y / r**2)
             case "zx":
-                response = functions.coupling(s) * (x / r)
+                response = evaluate(functions.coupling, s) * (x / r)
             case "zy":
-                response = functions.coupling(s) * (y / r)
+                response = evaluate(functions.coupling, s) * (y / r)
         return np.asarray(response)
 
 

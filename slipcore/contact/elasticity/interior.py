@@ -15,6 +15,7 @@ from scipy import special
 
 from slipcore.contact.defaults import INTERIOR, LAYER
 from slipcore.contact.elasticity.bonded_layer import polynomial, radii, wave_numbers
+from slipcore.contact.elasticity.chebyshev import evaluate
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.errors import InvalidInput
@@ -95,7 +96,7 @@ class Interior:
         if not np.isfinite(self.thickness):
             return free
         s = np.arcsinh(0.5 * r / self.thickness)
-        taken = [part(s) for part in _base(self, _reach(r, self.thickness))]
+        taken = [evaluate(part, s) for part in _base(self, _reach(r, self.thickness))]
         within = r <= LAYER.far * self.thickness
         return tuple(np.where(within, a + b, 0.0) for a, b in zip(free, taken, strict=True))
 
