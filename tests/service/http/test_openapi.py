@@ -12,28 +12,41 @@ from service.app import create_app
 from service.http import schemas
 from service.settings import Settings
 
-DESCRIPTION = create_app(Settings()).openapi()
-OPERATIONS = {
-    f"{method.upper()} {path}": operation
-    for path, operations in DESCRIPTION["paths"].items()
-    for method, operation in operations.items()
-}
+
+@pytest.fixture(scope="module")
+def description() -> dict[str, Any]:
+    """Made once and not when this file is read, which takes a second in each process of the tests."""
+    return create_app(Settings()).openapi()
 
 
-def test_each_route_is_documented_for_people_and_nothing_else_is() -> None:
+@pytest.fixture(scope="module")
+def operations(description: dict[str, Any]) -> dict[str, Any]:
+    """By method and path."""
+    return {
+        f"{method.upper()} {path}": operation
+        for path, of_path in description["paths"].items()
+        for method, operation in of_path.items()
+    }
+
+
+def test_each_route_is_documented_for_people_and_nothing_else_is(operations: dict[str, Any]) -> None:
     page = (Path(__file__).parents[3] / "docs/api.md").read_text()
-    assert set(re.findall(r"`((?:GET|POST|PUT|PATCH|DELETE) /[^`?]+)`", page)) == set(OPERATIONS)
+    assert set(re.findall(r"`((?:GET|POST|PUT|PATCH|DELETE) /[^`?]+)`", page)) == set(operations)
 
 
-def test_operations_have_names_of_their_own() -> None:
-    names = [operation["operationId"] for operation in OPERATIONS.values()]
+def test_operations_have_names_of_their_own(operations: dict[str, Any]) -> None:
+    names = [operation["operationId"] for operation in operations.values()]
     assert len(set(names)) == len(names)
 
 
-@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
-def test_each_route_is_described_with_its_errors(operation: dict[str, Any]) -> None:
-    assert operation["summary"]
-    assert operation["description"]
+def test_each_route_is_described_with_its_errors(operations: dict[str, Any]) -> None:
+    for name, operation in operations.items():
+        assert operation["summary"], name
+        assert operation["description"], name
+        check_responses(name, operation)
+
+
+def check_responses(name: str, operation: dict[str, Any]) -> None:
     for status, response in operation["responses"].items():
         media_type = "application/json" if int(status) < 400 else "application/problem+json"
         content = response.get("content", {})
@@ -43,36 +56,40 @@ def test_each_route_is_described_with_its_errors(operation: dict[str, Any]) -> N
         if "text/plain" in content:
             assert operation["operationId"] == "read_metrics"
             continue
-        assert list(content) == ([] if status in {"204", "304"} else [media_type])
+        assert list(content) == ([] if status in {"204", "304"} else [media_type]), name
         if int(status) >= 400:
-            assert response["content"][media_type]["schema"] == {"$ref": "#/components/schemas/ProblemOut"}
-            assert "/problems/" in response["description"]
+            assert response["content"][media_type]["schema"] == {"$ref": "#/components/schemas/ProblemOut"}, name
+            assert "/problems/" in response["description"], name
 
 
-@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
-def test_each_parameter_is_described(operation: dict[str, Any]) -> None:
-    for parameter in operation.get("parameters", []):
-        assert parameter["in"] == "path" or parameter["description"], parameter["name"]
+def test_each_parameter_is_described(operations: dict[str, Any]) -> None:
+    for name, operation in operations.items():
+        for parameter in operation.get("parameters", []):
+            assert parameter["in"] == "path" or parameter["description"], (name, parameter["name"])
 
+
+Examples = list[tuple[type[BaseModel], dict[str, Any]]]
 
 SCHEMAS = {
     name: schema
     for module in pkgutil.iter_modules(schemas.__path__, f"{schemas.__name__}.")
     for name, schema in vars(importlib.import_module(module.name)).items()
 }
-EXAMPLES = [
-    (SCHEMAS[name], example)
-    for name in DESCRIPTION["components"]["schemas"]
-    for example in SCHEMAS[name].model_json_schema().get("examples", [])
-]
 
 
-@pytest.mark.parametrize(("schema", "example"), EXAMPLES, ids=lambda value: getattr(value, "__name__", ""))
-def test_each_example_is_valid(schema: type[BaseModel], example: dict[str, Any]) -> None:
-    assert schema.model_validate(example).model_dump(mode="json", exclude_unset=True) == example
+@pytest.fixture(scope="module")
+def examples(description: dict[str, Any]) -> Examples:
+    """Each with its schema."""
+    names = description["components"]["schemas"]
+    return [(SCHEMAS[name], each) for name in names for each in SCHEMAS[name].model_json_schema().get("examples", [])]
 
 
-def test_what_goes_over_the_wire_has_an_example() -> None:
+def test_each_example_is_valid(examples: Examples) -> None:
+    for schema, example in examples:
+        assert schema.model_validate(example).model_dump(mode="json", exclude_unset=True) == example, schema.__name__
+
+
+def test_what_goes_over_the_wire_has_an_example(description: dict[str, Any], examples: Examples) -> None:
     without = {
         "FrictionModelsOut",
         "AuditOut",
@@ -92,11 +109,11 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
         "EventsOfOneKind",
     }
     without |= {"HealthOut", "ReadyOut", "WrongValue"}
-    assert {schema.__name__ for schema, _ in EXAMPLES} == set(DESCRIPTION["components"]["schemas"]) - without
+    assert {schema.__name__ for schema, _ in examples} == set(description["components"]["schemas"]) - without
 
 
-def test_the_description_is_written_once() -> None:
+def test_the_description_is_written_once(description: dict[str, Any]) -> None:
     """Anybody may ask for it, and it is long."""
     app = create_app(Settings())
     assert app._written is app._written  # type: ignore[attr-defined]
-    assert json.loads(app._written) == DESCRIPTION  # type: ignore[attr-defined]
+    assert json.loads(app._written) == description  # type: ignore[attr-defined]

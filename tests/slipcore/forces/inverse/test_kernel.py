@@ -1,5 +1,7 @@
 """Rows of the resolution kernel."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -10,14 +12,18 @@ from slipcore.forces.tracking.sensor import SensorResponse
 PITCH, GEL = 1e-3, Gel(1e6, 0.48, 4e-3)
 LINE = PITCH * (np.arange(9) - 4.0)
 REST = np.stack((*np.meshgrid(LINE, LINE, indexing="ij"), np.zeros((9, 9))), axis=-1)
-SENSOR = SensorResponse.of(REST, PITCH**2, GEL, (0, 1, 2))
+
+
+@cache
+def sensor() -> SensorResponse:
+    return SensorResponse.of(REST, PITCH**2, GEL, (0, 1, 2))
 
 
 def found(noise: float, with_depth: bool = True) -> Reconstruction:
     """Of a round pressure that is sheared by a fifth of it."""
-    place = SENSOR.nodes.places()
+    place = sensor().nodes.places()
     pressure = 0.1 * np.maximum(1.0 - np.sum(place**2, axis=1) / (2.8e-3) ** 2, 0.0)
-    field = np.einsum("mak,ak->m", SENSOR.response, np.stack((0.2 * pressure, 0.0 * pressure, pressure)))
+    field = np.einsum("mak,ak->m", sensor().response, np.stack((0.2 * pressure, 0.0 * pressure, pressure)))
     displacement = field.reshape(3, 9, 9).transpose(1, 2, 0) * [1.0, 1.0, -1.0 if with_depth else 0.0]
     shown = np.stack([displacement] * 3) + noise * np.random.default_rng(1).standard_normal((3, 9, 9, 3))
     return reconstruct(GraspLog(np.arange(3) / 30.0, REST, shown, PITCH**2), GEL, noise=max(noise, 1e-8))
