@@ -32,6 +32,7 @@ def write(
     numbers: object, tables: Mapping[str, str], arguments: argparse.Namespace, name: str, partly: bool = False
 ) -> None:
     """Write the numbers as JSON, and renew the page if there is one, or ``partly`` what of its tables is made anew."""
+    arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / name).write_text(json.dumps(numbers, indent=1), encoding="utf-8")
     if arguments.page is not None:
         renew(arguments.page, tables, partly)

@@ -65,6 +65,8 @@ def test_results_go_to_their_folder_and_pictures_beside_the_page(tmp_path: Path)
     assert json.loads((tmp_path / "results" / "numbers.json").read_text()) == {"a": 1.5}
     assert "<!-- table two -->\n| x |\n<!-- end -->" in page.read_text()
     assert picture_folder(Namespace(output=tmp_path / "other", page=None)) == tmp_path / "other"
+    write({}, {}, Namespace(output=tmp_path / "no" / "picture", page=None), "numbers.json")
+    assert (tmp_path / "no" / "picture" / "numbers.json").exists()
 
 
 def test_a_picture_has_few_colours(tmp_path: Path) -> None:
