@@ -64,9 +64,7 @@ def accuracy(
         found = [_of_material(what[0], url, key)]
     else:
         missing = next(str(path) for path in paths if not path.exists())
-        raise typer.BadParameter(
-            f"there is no file {missing}; allowed: one scene, grasp logs, or a material's name"
-        )
+        raise typer.BadParameter(f"there is no file {missing}; allowed: one scene, grasp logs, or a material's name")
     _tell(found, picture, json)
     if interrupted:
         raise typer.Exit(INTERRUPTED)
