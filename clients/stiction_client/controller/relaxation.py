@@ -66,8 +66,8 @@ class Relaxation:
         Less is enough while the stick ratio falls: a slide of all elements alike is slow to show in it, but then at
         once. What slides bears its friction of its force, which is no less than what it bore of it before.
         """
-        evidence, noise = self.lost - 0.5 * self.expected, max(load.noise, LEAST_NOISE * self.load)
-        deviations = settings.slide_deviations * (FALLING if sticking.falls(settings) else 1.0)
-        if evidence <= 0.5 * (deviations * noise) ** 2 or self.lost > 2.0 * self.expected:
+        evidence = self.lost - 0.5 * self.expected
+        if evidence <= 0.0 or self.lost > 2.0 * self.expected or self.bears < BORNE * sticking.bore:
             return False
-        return self.bears >= BORNE * sticking.bore
+        deviations = settings.slide_deviations * (FALLING if sticking.falls(settings) else 1.0)
+        return evidence > 0.5 * (deviations * max(load.noise, LEAST_NOISE * self.load)) ** 2
